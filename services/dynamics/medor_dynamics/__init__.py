@@ -1,0 +1,1 @@
+"""Cloth mesh and candidate actions in, rollouts and rewards out."""

@@ -1,0 +1,1 @@
+"""HTTP in, bus out: jobs, events, meshes, metrics."""

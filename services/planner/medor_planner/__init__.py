@@ -1,0 +1,1 @@
+"""Task and mesh in, the pick-and-place with the best predicted reward out; closed-loop episodes."""

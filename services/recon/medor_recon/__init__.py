@@ -1,0 +1,1 @@
+"""Depth image of a garment in, its cloth mesh out."""

@@ -1,0 +1,1 @@
+"""What cloth is: garments, the cloth solver, depth rasteriser, coverage and normalized improvement."""

@@ -1,0 +1,1 @@
+"""What travels between Medor's services and how: messages, endpoints, codec, bus, errors, launcher."""
