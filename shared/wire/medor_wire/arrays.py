@@ -41,9 +41,7 @@ class Shape:
     def sizes(self, array: NDArray[Any]) -> dict[str, int]:
         """Size of every named dimension."""
         dims = self.dims.split()
-        if array.ndim != len(dims) or any(
-            d.isdigit() and int(d) != n for d, n in zip(dims, array.shape, strict=False)
-        ):
+        if array.ndim != len(dims) or any(d.isdigit() and int(d) != n for d, n in zip(dims, array.shape, strict=False)):
             raise ValueError(f"expected shape ({', '.join(dims)}), got {array.shape}")
         return {d: n for d, n in zip(dims, array.shape, strict=True) if not d.isdigit()}
 

@@ -47,7 +47,8 @@ def array_fields(message: type[Message]) -> dict[str, Shape]:
     found: dict[str, Shape] = {}
     for name, field in message.model_fields.items():
         parts = [*field.metadata, *(x for arg in get_args(field.annotation) for x in get_args(arg))]
-        found |= {name: part for part in parts if isinstance(part, Shape)}
+        for shape in (part for part in parts if isinstance(part, Shape)):
+            found[name] = shape
     return found
 
 
