@@ -1,0 +1,1 @@
+"""Measurements over the bus: closed-loop tables, the wire, the solver."""
