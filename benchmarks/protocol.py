@@ -1,0 +1,61 @@
+"""Which episodes a benchmark runs: methods x categories x tasks x held-out states, each with fixed seeds."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from medor_wire.messages import Category, EpisodeRequest, ResetRequest, StartState, Task
+
+HELD_OUT_SEED = 800_000
+"""First garment seed that nothing is ever trained on."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One closed-loop episode of the protocol."""
+
+    method: str
+    category: Category
+    task: Task
+    state: int
+    start: StartState
+    picks: int
+    candidates: int
+
+    @property
+    def key(self) -> str:
+        """Names the trial in the results file; the same key is never run twice into one file."""
+        return f"{self.method}/{self.category}/{self.task}/{self.start}{self.state}/p{self.picks}/k{self.candidates}"
+
+    def request(self) -> EpisodeRequest:
+        """Garment and crumple depend on the state alone, so that all methods and tasks meet the same states."""
+        return EpisodeRequest(
+            category=self.category,
+            task=self.task,
+            method=self.method,
+            max_picks=self.picks,
+            candidates=self.candidates,
+            seed=self.state,
+            reset=ResetRequest(
+                category=self.category,
+                garment_seed=HELD_OUT_SEED + self.state,
+                state=self.start,
+                seed=self.state,
+            ),
+        )
+
+
+def trials(
+    methods: tuple[str, ...],
+    categories: tuple[Category, ...],
+    tasks: tuple[Task, ...],
+    states: int,
+    start: StartState,
+    picks: int,
+    candidates: int,
+) -> Iterator[Trial]:
+    """State by state, so that an unfinished run has every method on the same first states."""
+    for state in range(states):
+        for category in categories:
+            for task in tasks:
+                for method in methods:
+                    yield Trial(method, category, task, state, start, picks, candidates)
