@@ -104,15 +104,21 @@ def _count(points, faces):
         return 0
     covered = np.zeros((top - bottom + 1, right - left + 1), np.bool_)
     for f in range(len(faces)):
-        a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
-        if not np.isfinite(a[0] + a[1] + b[0] + b[1] + c[0] + c[1]):
+        ax, ay = points[faces[f, 0]]
+        bx, by = points[faces[f, 1]]
+        cx, cy = points[faces[f, 2]]
+        if not np.isfinite(ax + ay + bx + by + cx + cy):
             continue
-        first = int(max(bottom, np.ceil(min(a[1], b[1], c[1]))))
-        last = int(min(top, np.floor(max(a[1], b[1], c[1]))))
+        first = int(max(bottom, np.ceil(min(ay, by, cy))))
+        last = int(min(top, np.floor(max(ay, by, cy))))
         for row in range(first, last + 1):
-            low, high = _cut(a, b, c, row)
-            start, stop = int(max(left, np.ceil(low))) - left, int(min(right, np.floor(high))) - left
-            covered[row - bottom, start : stop + 1] = True
+            low_ab, high_ab = _cut(ax, ay, bx, by, row)
+            low_bc, high_bc = _cut(bx, by, cx, cy, row)
+            low_ca, high_ca = _cut(cx, cy, ax, ay, row)
+            start = int(np.ceil(max(left, min(low_ab, low_bc, low_ca))))
+            stop = int(np.floor(min(right, max(high_ab, high_bc, high_ca))))
+            for column in range(start, stop + 1):
+                covered[row - bottom, column - left] = True
     return np.count_nonzero(covered)
 
 
@@ -135,14 +141,11 @@ def _window(points):
 
 
 @njit(nogil=True, cache=True)
-def _cut(a, b, c, row):
-    """Where the line y = row enters and leaves a triangle that it meets."""
-    low, high = np.inf, -np.inf
-    for p, q in ((a, b), (b, c), (c, a)):
-        if min(p[1], q[1]) <= row <= max(p[1], q[1]):
-            if p[1] == q[1]:
-                low, high = min(low, p[0], q[0]), max(high, p[0], q[0])
-            else:
-                x = p[0] + (q[0] - p[0]) * (row - p[1]) / (q[1] - p[1])
-                low, high = min(low, x), max(high, x)
-    return low, high
+def _cut(px, py, qx, qy, row):
+    """Where the line y = row meets the edge from p to q: an interval, empty (inf, -inf) when it does not."""
+    if row < min(py, qy) or row > max(py, qy):
+        return np.inf, -np.inf
+    if py == qy:
+        return min(px, qx), max(px, qx)
+    x = px + (qx - px) * (row - py) / (qy - py)
+    return x, x

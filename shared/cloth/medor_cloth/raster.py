@@ -44,7 +44,14 @@ def rasterize(vertices: np.ndarray, faces: np.ndarray, camera: Camera) -> Raster
         camera: where from.
     """
     edges, plane, bounds = _setup(camera, vertices, faces)
-    return Raster(*_rasterize(edges, plane, bounds, camera.height, camera.width))
+    shape = (camera.height, camera.width)
+    # Allocated here because numpy, unlike numba, takes zeroed pages that cost nothing until they are written.
+    raster = Raster(
+        np.zeros(shape, np.float32), np.full(shape, -1, np.int32), np.zeros((*shape, 3), np.float32)
+    )
+    _nearest_faces(edges, plane, bounds, raster.depth, raster.face)
+    _resolve(edges, raster.depth, raster.face, raster.barycentric)
+    return raster
 
 
 def visible_vertices(
@@ -132,46 +139,44 @@ def _span(low, high, size):
 
 
 @njit(nogil=True, cache=True)
-def _rasterize(edges, plane, bounds, height, width):
-    nearest = np.zeros((height, width))
-    face = np.full((height, width), -1, np.int32)
+def _nearest_faces(edges, plane, bounds, nearest, face):
+    """Write 1/depth and the index of the nearest face into (H, W) images of zeros and of -1."""
+    height, width = face.shape
     for f in range(edges.shape[0]):
         j0, j1 = _span(bounds[f, 0], bounds[f, 1], width)
         i0, i1 = _span(bounds[f, 2], bounds[f, 3], height)
-        e = edges[f]
+        a0, a1, a2 = edges[f, 0, 0], edges[f, 0, 1], edges[f, 0, 2]
+        b0, b1, b2 = edges[f, 1, 0], edges[f, 1, 1], edges[f, 1, 2]
+        c0, c1, c2 = edges[f, 2, 0], edges[f, 2, 1], edges[f, 2, 2]
+        p0, p1, p2 = plane[f, 0], plane[f, 1], plane[f, 2]
         for i in range(i0, i1 + 1):
             v = i + 0.5
-            ra, rb, rc = e[0, 1] * v + e[0, 2], e[1, 1] * v + e[1, 2], e[2, 1] * v + e[2, 2]
-            rp = plane[f, 1] * v + plane[f, 2]
+            a_row, b_row, c_row, p_row = a1 * v + a2, b1 * v + b2, c1 * v + c2, p1 * v + p2
             for j in range(j0, j1 + 1):
                 u = j + 0.5
-                if e[0, 0] * u + ra >= 0 and e[1, 0] * u + rb >= 0 and e[2, 0] * u + rc >= 0:
-                    inverse_depth = plane[f, 0] * u + rp
+                if a0 * u + a_row >= 0 and b0 * u + b_row >= 0 and c0 * u + c_row >= 0:
+                    inverse_depth = p0 * u + p_row
                     if inverse_depth > nearest[i, j]:
                         nearest[i, j] = inverse_depth
                         face[i, j] = f
-    return _resolve(edges, nearest, face)
 
 
 @njit(nogil=True, cache=True)
-def _resolve(edges, nearest, face):
-    """Depth and barycentric coordinates of the faces that won their pixels."""
-    height, width = face.shape
-    depth = np.zeros((height, width), np.float32)
-    barycentric = np.zeros((height, width, 3), np.float32)
-    for i in range(height):
-        for j in range(width):
-            if face[i, j] >= 0:
-                e = edges[face[i, j]]
-                a = e[0, 0] * (j + 0.5) + (e[0, 1] * (i + 0.5) + e[0, 2])
-                b = e[1, 0] * (j + 0.5) + (e[1, 1] * (i + 0.5) + e[1, 2])
-                c = e[2, 0] * (j + 0.5) + (e[2, 1] * (i + 0.5) + e[2, 2])
-                total = a + b + c
-                barycentric[i, j, 0] = a / total
-                barycentric[i, j, 1] = b / total
-                barycentric[i, j, 2] = c / total
-                depth[i, j] = 1.0 / nearest[i, j]
-    return depth, face, barycentric
+def _resolve(edges, depth, face, barycentric):
+    """Turn 1/depth into depth in place and write the barycentric coordinates of the faces seen."""
+    for i in range(face.shape[0]):
+        for j in range(face.shape[1]):
+            f = face[i, j]
+            if f >= 0:
+                u, v = j + 0.5, i + 0.5
+                a = edges[f, 0, 0] * u + (edges[f, 0, 1] * v + edges[f, 0, 2])
+                b = edges[f, 1, 0] * u + (edges[f, 1, 1] * v + edges[f, 1, 2])
+                c = edges[f, 2, 0] * u + (edges[f, 2, 1] * v + edges[f, 2, 2])
+                scale = 1.0 / (a + b + c)
+                barycentric[i, j, 0] = a * scale
+                barycentric[i, j, 1] = b * scale
+                barycentric[i, j, 2] = c * scale
+                depth[i, j] = 1.0 / depth[i, j]
 
 
 @njit(nogil=True, cache=True)
