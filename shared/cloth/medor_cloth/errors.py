@@ -1,0 +1,18 @@
+"""The error tree of the cloth package, from general to specific.
+
+ClothError
+├── MeshError       a mesh that cannot be cloth: what was found and what is needed
+└── GarmentError    a garment that cannot be made: unknown category, no valid shape for this seed
+"""
+
+
+class ClothError(ValueError):
+    """Anything the cloth package reports on purpose."""
+
+
+class MeshError(ClothError):
+    """A mesh that cannot be used as cloth."""
+
+
+class GarmentError(ClothError):
+    """A garment that cannot be generated."""
