@@ -1,0 +1,70 @@
+"""Backend `physics`: candidates rolled out by the cloth solver (MEDOR's ground-truth dynamics)."""
+
+import time
+from functools import lru_cache
+
+import numpy as np
+from medor_cloth.cloth import Cloth
+from medor_cloth.errors import ClothError
+from medor_cloth.rollout import rollouts
+from medor_cloth.solver import Solver
+from medor_wire.bus import Call
+from medor_wire.content import ByContent
+from medor_wire.errors import BadRequest
+from medor_wire.messages import ClothMesh, RolloutProgress, RolloutRequest, Rollouts
+
+from medor_dynamics.rewards import rewards
+
+DIVERGED_PENALTY = 1e6
+"""Taken off the reward of the unmoved cloth when a rollout left the finite numbers: never chosen, still comparable."""
+
+
+class Physics:
+    """Rolls candidates out on a mesh with as many threads as it is given."""
+
+    def __init__(self, threads: int, keep: int = 8) -> None:
+        self._threads = threads
+        self._solver_of = lru_cache(keep)(solver_of)
+
+    def roll_out(self, request: RolloutRequest, call: Call) -> Rollouts:
+        """Final positions and rewards of all candidates. Neither depends on the number of threads.
+
+        Raises:
+            BadRequest: a mesh that cannot be cloth, goals that do not fit it.
+            Cancelled, Timeout: the asker does not want the answer any more.
+        """
+        started = time.perf_counter()
+        mesh, total = request.mesh, len(request.picks)
+        solver = self._solver_of(by_rest_shape(mesh))
+        positions = rollouts(
+            solver,
+            mesh.vertices,
+            request.picks,
+            request.places,
+            threads=self._threads,
+            cancelled=call.cancelled,
+            on_done=lambda done: call.progress(RolloutProgress(done=done, total=total)),
+        )
+        call.check()
+        finite = np.isfinite(positions).all(axis=(1, 2))
+        positions = np.where(finite[:, None, None], positions, mesh.vertices)
+        scores = rewards(positions, mesh.faces, request.reward, threads=self._threads)
+        return Rollouts(
+            positions=positions,
+            rewards=scores - DIVERGED_PENALTY * ~finite,
+            seconds=time.perf_counter() - started,
+        )
+
+
+def by_rest_shape(mesh: ClothMesh) -> ByContent[ClothMesh]:
+    """A mesh compared by what its solver depends on: with panels, not by where its vertices are."""
+    return ByContent.of(mesh, mesh.faces, mesh.vertices if mesh.panel_uv is None else mesh.panel_uv)
+
+
+def solver_of(mesh: ByContent[ClothMesh]) -> Solver:
+    """The solver of a mesh: at rest in its panels, else as it lies (MEDOR, section IV-B)."""
+    vertices, faces, panel_uv = mesh.value.vertices, mesh.value.faces, mesh.value.panel_uv
+    try:
+        return Solver(Cloth.from_mesh(vertices, faces, panel_uv))
+    except ClothError as error:
+        raise BadRequest(f"the mesh cannot be cloth: {error}") from error

@@ -1,0 +1,38 @@
+"""Dynamics service: a cloth mesh and candidate actions in, rollouts and rewards out; canonical meshes laid flat.
+
+Stateless: any number of replicas share the candidates of one plan.
+"""
+
+import os
+
+from medor_wire import endpoints
+from medor_wire.config import Settings
+from medor_wire.zenoh_bus import join
+
+from medor_dynamics.flatten import Flattener
+from medor_dynamics.physics import Physics
+from medor_dynamics.roller import Roller
+from medor_dynamics.warm_up import warm_up
+
+
+class Config(Settings, section="dynamics"):
+    threads: int = 0
+    """Threads of one rollout request; 0: this replica's share of all processors."""
+    replicas: int = 1
+    """Replicas on this machine, which share its processors."""
+
+
+def main(config: Config) -> None:
+    threads = config.threads or -(-(os.cpu_count() or 1) // config.replicas)
+    roller = Roller({"physics": Physics(threads)})
+    with join("dynamics", config.bus) as bus:
+        bus.ready(False, "compiling")
+        bus.serve(endpoints.ROLLOUT, roller.roll_out)
+        bus.serve(endpoints.FLATTEN, Flattener().flatten)
+        warm_up()
+        bus.ready()
+        bus.run()
+
+
+if __name__ == "__main__":
+    main(Config.from_command_line())

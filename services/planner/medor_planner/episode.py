@@ -1,0 +1,136 @@
+"""Closed loop: look, plan, act, score, until the garment is done or the picks are used up (MEDOR, section V)."""
+
+import time
+from dataclasses import dataclass
+
+from medor_wire import endpoints
+from medor_wire.bus import Bus, Call
+from medor_wire.errors import BadRequest, Unavailable
+from medor_wire.messages import (
+    Empty,
+    Episode,
+    EpisodePick,
+    EpisodeProgress,
+    EpisodeRequest,
+    Message,
+    PlanProgress,
+    PlanRequest,
+    Score,
+    Task,
+)
+
+from medor_planner.executor import Executor, Hand
+from medor_planner.methods import method_named
+from medor_planner.planner import Planner
+
+
+class Episodes:
+    """Runs episodes, one at a time: an episode holds the robot from its start to its end."""
+
+    def __init__(self, bus: Bus, planner: Planner, executor: Executor) -> None:
+        self._bus = bus
+        self._planner = planner
+        self._executor = executor
+
+    def run(self, request: EpisodeRequest, call: Call) -> Episode:
+        """One episode. Doing nothing spends a pick like any action: the next one samples other candidates.
+
+        Cancelling ends it before the next action. Any error ends it and is its answer.
+
+        Raises:
+            LeaseHeld: the robot is taken.
+            Unavailable: there is no referee (`sim/score`), or another service does not answer.
+        """
+        check(request)
+        if not self._bus.instances(endpoints.SCORE.service):
+            raise Unavailable("episodes need a referee: no service answers sim/score in this cell")
+        with self._executor.hold() as hand:
+            score = self._bus.ask(endpoints.RESET, request.reset) if request.reset else self._score()
+            picks = [EpisodePick(index=0, coverage_m2=score.coverage_m2, ni=improvement(score, request.task))]
+            call.progress(EpisodeProgress(step=picks[0]))
+            while picks[-1].ni <= request.stop_ni and len(picks) <= request.max_picks:
+                pick = self._pick(request, len(picks), hand, call)
+                call.progress(EpisodeProgress(step=pick))
+                picks.append(pick.model_copy(update={"view": None, "plan": None}))
+        return Episode(
+            ni=picks[-1].ni,
+            picks=tuple(picks),
+            flat_coverage_m2=score.flat_coverage_m2,
+            reason="solved" if picks[-1].ni > request.stop_ni else "max_picks",
+        )
+
+    def _pick(self, request: EpisodeRequest, index: int, hand: Hand, call: Call) -> EpisodePick:
+        """Look, plan, act and score once."""
+        call.check()
+        started = time.perf_counter()
+        view = self._bus.ask(endpoints.CAPTURE, Empty())
+        captured = time.perf_counter()
+        asked = PlanRequest(
+            category=request.category,
+            task=request.task,
+            method=request.method,
+            view=view,
+            candidates=request.candidates,
+            seed=request.seed,
+        )
+        plan = self._planner.plan(asked, Planning(call), pick_index=index)
+        call.check()
+        planned = time.perf_counter()
+        hand.act(plan)
+        acted = time.perf_counter()
+        score = self._score()
+        return EpisodePick(
+            index=index,
+            pick=plan.pick,
+            place=plan.place,
+            no_op=plan.no_op,
+            reward=plan.reward,
+            no_op_reward=plan.no_op_reward,
+            coverage_m2=score.coverage_m2,
+            ni=improvement(score, request.task),
+            timings_ms={
+                **plan.timings_ms,
+                "capture": 1e3 * (captured - started),
+                "act": 1e3 * (acted - planned),
+                "total": 1e3 * (time.perf_counter() - started),
+            },
+            view=view,
+            plan=plan,
+        )
+
+    def _score(self) -> Score:
+        return self._bus.ask(endpoints.SCORE, Empty())
+
+
+def check(request: EpisodeRequest) -> None:
+    """Refuse what could only fail later."""
+    method_named(request.method)
+    reset = request.reset
+    if reset is not None and reset.garment_id is None and reset.category != request.category:
+        raise BadRequest(f"the episode is for {request.category}, but its reset lays out {reset.category}")
+
+
+def improvement(score: Score, task: Task) -> float:
+    """Normalized improvement of the task."""
+    return score.ni_flatten if task == "flatten" else score.ni_canonicalize
+
+
+@dataclass(frozen=True)
+class Planning:
+    """An episode's call as a plan inside it sees it: the plan's progress becomes the episode's."""
+
+    call: Call
+
+    @property
+    def request_id(self) -> str:
+        return self.call.request_id
+
+    def progress(self, message: Message) -> None:
+        if isinstance(message, PlanProgress):
+            self.call.progress(EpisodeProgress(planning=message))
+
+    def cancelled(self) -> bool:
+        return self.call.cancelled()
+
+    def check(self) -> None:
+        self.call.check()

@@ -1,0 +1,41 @@
+"""Methods: named presets of what the planner sees, what it plans with and where its goals come from."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from medor_wire.errors import BadRequest
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to plan."""
+
+    name: str
+    recon: str | None
+    """Reconstruction method that makes the mesh; None: the simulator's true mesh."""
+    dynamics: str | None
+    """Backend that rolls candidates out; None: no model, one random pick-and-place."""
+    goals: Literal["mesh", "template"] = "template"
+    """Whose canonical pose is the goal of `canonicalize`: the planned mesh's own, or a fixed garment's of the
+    category, whose vertices do not correspond with the mesh."""
+
+
+VISIBLE = Method("visible", recon="visible", dynamics="physics")
+"""Only what the camera sees, rolled out by the cloth solver."""
+ORACLE = Method("oracle", recon=None, dynamics="physics", goals="mesh")
+"""The true mesh, rolled out by the cloth solver: the upper bound (MEDOR, ablations). Simulation only."""
+RANDOM = Method("random", recon="visible", dynamics=None)
+"""A pick near the outline, a place off the cloth (MEDOR, robot baseline)."""
+
+METHODS = {method.name: method for method in (VISIBLE, ORACLE, RANDOM)}
+
+
+def method_named(name: str) -> Method:
+    """The preset of that name.
+
+    Raises:
+        BadRequest: there is none.
+    """
+    if name not in METHODS:
+        raise BadRequest(f"expected a method of {', '.join(METHODS)}, got {name!r}")
+    return METHODS[name]

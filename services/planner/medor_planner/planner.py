@@ -1,0 +1,105 @@
+"""The planner: one observation in, the pick-and-place with the best predicted reward out (MEDOR, section IV-C)."""
+
+import threading
+
+import numpy as np
+from medor_wire import endpoints
+from medor_wire.bus import Bus, Call
+from medor_wire.errors import BadRequest
+from medor_wire.messages import (
+    ClothMesh,
+    DepthView,
+    Empty,
+    Plan,
+    PlanRequest,
+    ReachRequest,
+    ReconstructRequest,
+    Reward,
+    RolloutRequest,
+)
+from numpy.typing import NDArray
+
+from medor_planner.choice import Choice, no_op
+from medor_planner.goals import Goals
+from medor_planner.methods import Method, method_named
+from medor_planner.plans import Plans
+from medor_planner.random_policy import random_action
+from medor_planner.sampling import Candidates, Scene, sample
+from medor_planner.shooting import CHUNK, Shooting
+from medor_planner.watching import Stages, cancelling
+
+
+class Planner:
+    """Plans by asking: the cell for what it sees, recon for the mesh, dynamics for what actions would do."""
+
+    def __init__(self, bus: Bus, plans: Plans, chunk: int = CHUNK) -> None:
+        self._bus = bus
+        self._plans = plans
+        self._goals = Goals(bus)
+        self._chunk = chunk
+
+    def plan(self, request: PlanRequest, call: Call, pick_index: int = 0) -> Plan:
+        """The best of `request.candidates` sampled actions, or doing nothing when that is predicted best.
+
+        The same request and `pick_index` (the number of the pick in an episode) give the same action.
+
+        Raises:
+            BadRequest: unknown method, or another category on the table.
+            OutOfReach: no candidate has both ends in the arm's reach.
+            Unavailable: a service that is needed does not answer.
+        """
+        method = method_named(request.method)
+        rng = np.random.default_rng([request.seed, pick_index])
+        stages = Stages(call)
+        with cancelling(call) as cancel:
+            with stages.stage("capture"):
+                view = request.view or self._bus.ask(endpoints.CAPTURE, Empty(), cancel=cancel)
+            with stages.stage("reconstruct"):
+                scene = Scene(self._mesh(method, request, view, cancel), view)
+            if method.dynamics is None:
+                with stages.stage("sample"):
+                    choice = Choice.unrated(random_action(scene, rng, self._reachable))
+            else:
+                with stages.stage("goals"):
+                    reward = self._reward(method, request, scene.mesh, cancel)
+                with stages.stage("sample"):
+                    candidates = sample(scene, request.candidates, rng, reachable=self._reachable)
+                with stages.stage("rollout"):
+                    choice = self._shoot(method, scene.mesh, candidates, reward, stages, cancel)
+        plan = choice.plan(request, scene.mesh, stages.total())
+        self._plans.add(plan)
+        return plan
+
+    def _mesh(self, method: Method, request: PlanRequest, view: DepthView, cancel: threading.Event) -> ClothMesh:
+        if method.recon is None:
+            mesh = self._bus.ask(endpoints.TRUTH, Empty(), cancel=cancel).mesh
+            if mesh.category != request.category:
+                raise BadRequest(f"asked to plan for {request.category}, but {mesh.category} lies on the table")
+            return mesh
+        asked = ReconstructRequest(view=view, category=request.category, method=method.recon)
+        return self._bus.ask(endpoints.RECONSTRUCT, asked, cancel=cancel).mesh
+
+    def _reward(self, method: Method, request: PlanRequest, mesh: ClothMesh, cancel: threading.Event) -> Reward:
+        if request.task == "flatten":
+            return Reward(task="flatten")
+        return self._goals.reward(method, mesh, cancel)
+
+    def _reachable(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+        return self._bus.ask(endpoints.REACH, ReachRequest(points=points)).reachable
+
+    def _shoot(
+        self,
+        method: Method,
+        mesh: ClothMesh,
+        candidates: Candidates,
+        reward: Reward,
+        stages: Stages,
+        cancel: threading.Event,
+    ) -> "Choice":
+        every = no_op(mesh) + candidates
+        request = RolloutRequest(
+            mesh=mesh, picks=every.picks, places=every.places, reward=reward, backend=method.dynamics or ""
+        )
+        shooting = Shooting(self._bus, request, cancel, self._chunk)
+        rewards = shooting.rewards(on_fraction=lambda fraction: stages.report("rollout", fraction))
+        return Choice(candidates, rewards[1:], float(rewards[0]))

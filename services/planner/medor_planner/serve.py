@@ -1,0 +1,37 @@
+"""Planner service: task and view in, the best pick-and-place out; plans executed once; closed-loop episodes.
+
+Plans run beside each other; actions and episodes one at a time, since there is one robot.
+"""
+
+from medor_wire import endpoints
+from medor_wire.config import Settings
+from medor_wire.zenoh_bus import join
+
+from medor_planner.episode import Episodes
+from medor_planner.executor import Executor
+from medor_planner.planner import Planner
+from medor_planner.plans import Plans
+from medor_planner.shooting import CHUNK
+
+
+class Config(Settings, section="planner"):
+    keep_plans: int = 64
+    """Plans that can still be executed; older ones are forgotten."""
+    chunk: int = CHUNK
+    """Candidates per request to a dynamics instance."""
+    plans_at_once: int = 2
+
+
+def main(config: Config) -> None:
+    with join("planner", config.bus) as bus:
+        plans = Plans(config.keep_plans)
+        planner = Planner(bus, plans, config.chunk)
+        executor = Executor(bus, plans)
+        bus.serve(endpoints.PLAN, planner.plan, workers=config.plans_at_once)
+        bus.serve(endpoints.EXECUTE, executor.execute)
+        bus.serve(endpoints.EPISODE, Episodes(bus, planner, executor).run, queue=0)
+        bus.run()
+
+
+if __name__ == "__main__":
+    main(Config.from_command_line())
