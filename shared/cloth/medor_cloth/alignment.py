@@ -11,7 +11,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 ICP_ROUNDS = 5
-ICP_HEADINGS = 8
+ICP_HEADINGS = 12
+ICP_LAST_ROUNDS = 10
 
 
 def align_in_plane(source: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -66,26 +67,35 @@ def canonical_cost(positions: np.ndarray, goals: np.ndarray, *, squared: bool = 
     return np.min(costs, axis=0)
 
 
-def canonical_cost_unmatched(points: np.ndarray, goals: np.ndarray) -> float:
+def canonical_cost_unmatched(points: np.ndarray, goals: np.ndarray, *, headings: int = ICP_HEADINGS) -> float:
     """Mean distance from points to the nearest goal when there is no correspondence [m].
 
-    Five rounds of nearest neighbour (every point looks for its nearest goal point) and the same fit, from
-    several headings since the fit is local; then the mean distance to the nearest goal point.
+    Five rounds of nearest neighbour (every point looks for its nearest goal point) and the same fit (MEDOR, the
+    baselines' cost). The fit is local, so it starts from several headings and the best is carried on.
 
     Args:
         points: (N, 3) world frame [m].
         goals: (S, G, 3) world frame [m]; G and N need not be equal.
+        headings: starts of the fit, evenly spread over the full turn; the time grows with them.
     """
-    return min(_icp_cost(np.asarray(points, np.float64), np.asarray(goal, np.float64)) for goal in goals)
+    points = np.asarray(points, np.float64)
+    return min(_icp_cost(points, np.asarray(goal, np.float64), headings) for goal in goals)
 
 
-def _icp_cost(points: np.ndarray, goal: np.ndarray) -> float:
+def _icp_cost(points: np.ndarray, goal: np.ndarray, headings: int) -> float:
     # Moving the points instead of the goal leaves every distance as it is and needs one search tree only.
     tree = cKDTree(goal)
-    R = rotation(np.arange(ICP_HEADINGS) * (2 * np.pi / ICP_HEADINGS))
+    R = rotation(np.arange(headings) * (2 * np.pi / headings))
     t = goal[:, :2].mean(axis=0) - R @ points[:, :2].mean(axis=0)
-    for _ in range(ICP_ROUNDS):
+    R, t, costs = _icp(points, goal, tree, R, t, ICP_ROUNDS)
+    best = costs.argmin()
+    _, _, refined = _icp(points, goal, tree, R[best], t[best], ICP_LAST_ROUNDS)
+    return float(min(costs[best], refined))
+
+
+def _icp(points: np.ndarray, goal: np.ndarray, tree: cKDTree, R: np.ndarray, t: np.ndarray, rounds: int):
+    for _ in range(rounds):
         _, nearest = tree.query(moved_in_plane(points, R, t))
         R, t = align_in_plane(points, goal[nearest])
     distance, _ = tree.query(moved_in_plane(points, R, t))
-    return float(distance.mean(axis=-1).min())
+    return R, t, distance.mean(axis=-1)

@@ -43,13 +43,13 @@ def coverages(batch: np.ndarray, faces: np.ndarray, *, threads: int = 0) -> np.n
         faces: (F, 3) int.
         threads: how many to use; 0 means every processor. The result does not depend on it.
     """
-    lattice_xy = np.ascontiguousarray(np.asarray(batch)[..., :2])
-    faces = np.asarray(faces, np.int32)
-    threads = min(threads or os.cpu_count() or 1, len(lattice_xy))
+    batch_xy = np.ascontiguousarray(np.asarray(batch)[..., :2], np.float64)
+    faces = np.ascontiguousarray(faces, np.int32)
+    threads = min(threads or os.cpu_count() or 1, len(batch_xy))
     if threads <= 1:
-        return _coverages(lattice_xy, faces)
+        return _coverages(batch_xy, faces)
     with ThreadPoolExecutor(threads) as pool:
-        parts = pool.map(lambda part: _coverages(part, faces), np.array_split(lattice_xy, threads))
+        parts = pool.map(lambda part: _coverages(part, faces), np.array_split(batch_xy, threads))
         return np.concatenate(list(parts))
 
 

@@ -40,23 +40,19 @@ def rasterize(vertices: np.ndarray, faces: np.ndarray, camera: Camera) -> Raster
 
     Args:
         vertices: (V, 3) world frame [m].
-        faces: (F, 3) int, either winding; both sides are seen.
+        faces: (F, 3) int, either winding; both sides are seen. Faces with a corner that is NaN are not.
         camera: where from.
     """
     edges, plane, bounds = _setup(camera, vertices, faces)
     shape = (camera.height, camera.width)
     # Allocated here because numpy, unlike numba, takes zeroed pages that cost nothing until they are written.
-    raster = Raster(
-        np.zeros(shape, np.float32), np.full(shape, -1, np.int32), np.zeros((*shape, 3), np.float32)
-    )
+    raster = Raster(np.zeros(shape, np.float32), np.full(shape, -1, np.int32), np.zeros((*shape, 3), np.float32))
     _nearest_faces(edges, plane, bounds, raster.depth, raster.face)
     _resolve(edges, raster.depth, raster.face, raster.barycentric)
     return raster
 
 
-def visible_vertices(
-    vertices: np.ndarray, faces: np.ndarray, camera: Camera, tolerance: float = 0.002
-) -> np.ndarray:
+def visible_vertices(vertices: np.ndarray, faces: np.ndarray, camera: Camera, tolerance: float = 0.002) -> np.ndarray:
     """(V,) bool: vertices inside the image with no cloth in front of them.
 
     Visibility is decided on the ray through the vertex itself, so it does not depend on the image resolution.
@@ -78,7 +74,7 @@ def visible_vertices(
 
 
 def _setup(camera: Camera, vertices: np.ndarray, faces: np.ndarray):
-    return _triangles(camera.to_camera(vertices), np.asarray(faces, np.int32), camera.K, camera.K_inverse)
+    return _triangles(camera.to_camera(vertices), np.ascontiguousarray(faces, np.int32), camera.K, camera.K_inverse)
 
 
 @njit(nogil=True, cache=True)
@@ -102,7 +98,7 @@ def _triangles(points, faces, K, K_inverse):
                 volume = x * c[0] + y * c[1] + z * c[2]
         if volume < 0:
             edges[f] = -edges[f]
-        if volume == 0:
+        if not 0 < abs(volume) < np.inf:  # seen edge-on, or with a corner that is not a number
             bounds[f] = (0.0, -1.0, 0.0, -1.0)
         else:
             plane[f] = (edges[f, 0] + edges[f, 1] + edges[f, 2]) / abs(volume)
@@ -197,5 +193,5 @@ def _hidden(edges, plane, bounds, uv, depth_limit):
                 and e[2, 0] * u + e[2, 1] * v + e[2, 2] >= 0
             ):
                 inverse_depth = plane[f, 0] * u + plane[f, 1] * v + plane[f, 2]
-                hidden[p] = inverse_depth > 0 and 1.0 < inverse_depth * depth_limit[p]
+                hidden[p] = inverse_depth > 0 and inverse_depth * depth_limit[p] > 1.0
     return hidden
