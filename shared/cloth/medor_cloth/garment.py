@@ -49,7 +49,7 @@ class Garment:
         Returns:
             (V, 3) task space [m], body up = world +y, centred on the origin; layers apart and none crossing.
         """
-        if self.seed is None or self.panel_uv is None:
+        if self.panel_uv is None:
             return squashed(self.vertices)
         return laid_from_panels(self.faces, self.panel_uv, len(self.vertices))
 
