@@ -1,0 +1,180 @@
+"""The frame loop of the solver: substeps of prediction, springs, contact and velocity update (XPBD)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from medor_cloth.cloth import Springs
+from medor_cloth.contact import part_layers, rest_on_table
+from medor_cloth.picker import nearest_within_reach
+from medor_cloth.proximity import find_candidates, keep_neighbours, left_margin, widen
+from medor_cloth.springs import damp_springs, relax_springs
+
+FRAME_S = 0.01
+"""Duration of one frame [s]."""
+CALM_FRAMES = 3
+"""Frames in a row after which a slow cloth counts as settled."""
+
+_ZERO, _ONE = np.float32(0), np.float32(1)
+_DAMPED_EVERY = 4
+_CALM_SHARE = 200
+"""One in so many vertices may be faster than the settled speed."""
+
+
+class Topology(NamedTuple):
+    """The cloth as the kernels see it."""
+
+    faces: NDArray[np.int32]
+    across: NDArray[np.int32]
+    stretch: Springs
+    bend: Springs
+    points: NDArray[np.int32]
+
+
+class Physics(NamedTuple):
+    """The constants as the kernels see them, in float32 and per substep where they belong to one."""
+
+    substeps: int
+    step: np.float32
+    gravity: np.float32
+    drag: np.float32
+    top_speed: np.float32
+    thickness: np.float32
+    table_friction: np.float32
+    layer_friction: np.float32
+    push_out: np.float32
+    bend_compliance: np.float32
+    compression: np.float32
+    spring_damping: np.float32
+    settle_speed: np.float32
+    cell: np.float32
+    near_margin: np.float32
+    near_horizon: np.float32
+    far_margin: np.float32
+    far_horizon: np.float32
+    far_limit: np.float32
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def simulate(x, v, reference, margin, picker, path, holding, held, calm, topology: Topology, physics: Physics):
+    """Moves the cloth through the frames of a picker path, or until it has settled.
+
+    Args:
+        x: Positions (V,3) [m], changed in place, as are the next four.
+        v: Velocities (V,3) [m/s].
+        reference: Positions (V,3) [m] the contact candidates were last found at.
+        margin: Way each vertex may go from there (V,) [m].
+        picker: Position (3,) [m].
+        path: Picker position at the end of each frame (T,3) [m].
+        holding: Whether the picker is closed in each frame (T,).
+        held: Vertex in the picker, -1 for none.
+        calm: Frames the cloth has been slow for.
+        topology: The cloth.
+        physics: The constants.
+
+    Returns:
+        (frames done, held, calm).
+    """
+    n = len(x)
+    inverse_mass = np.ones(n, np.float32)
+    before, start = np.empty_like(x), np.empty(3, np.float32)
+    near_reference, near_margin = np.empty_like(x), np.empty(n, np.float32)
+    longest = max(_longest(topology.stretch.colours), _longest(topology.bend.colours))
+    scratch = np.empty((4, longest), np.float32)
+    faces, points, thickness = topology.faces, topology.points, physics.thickness
+    found, near = np.empty(24 * len(points), np.int32), np.empty((8 * len(points), 2), np.int32)
+    starts, found = find_candidates(
+        x=reference,
+        margin=margin,
+        faces=faces,
+        across=topology.across,
+        points=points,
+        thickness=thickness,
+        cell=physics.cell,
+        found=found,
+    )
+    near_starts = starts
+    for frame in range(len(path)):
+        held = (held if held >= 0 else nearest_within_reach(x, picker)) if holding[frame] else -1
+        if held >= 0:
+            inverse_mass[held] = _ZERO
+            start[:] = x[held]
+        for substep in range(physics.substeps):
+            _predict(x, v, before, inverse_mass, physics)
+            if held >= 0:
+                share = np.float32(substep + 1) / np.float32(physics.substeps)
+                for axis in range(3):
+                    x[held, axis] = start[axis] + share * (path[frame, axis] - picker[axis])
+                x[held, 2] = max(x[held, 2], thickness * np.float32(0.5))
+            relax_springs(x, inverse_mass, topology.bend, physics.bend_compliance, _ONE, scratch)
+            relax_springs(x, inverse_mass, topology.stretch, _ZERO, physics.compression, scratch)
+            if substep == 0 or left_margin(x, near_reference, near_margin):
+                widen(v, physics.near_margin, physics.near_horizon, physics.far_margin, near_margin)
+                near_reference[:] = x
+                if left_margin(x, reference, margin - near_margin):
+                    widen(v, physics.far_margin, physics.far_horizon, physics.far_limit, margin)
+                    reference[:] = x
+                    starts, found = find_candidates(
+                        x, margin, faces, topology.across, points, thickness, physics.cell, found
+                    )
+                near_starts, near = keep_neighbours(x, near_margin, faces, points, thickness, starts, found, near)
+            part_layers(
+                x, before, inverse_mass, faces, near_starts, near, thickness, physics.layer_friction, physics.push_out
+            )
+            rest_on_table(x, before, inverse_mass, thickness * np.float32(0.5), physics.table_friction)
+            _update_velocity(x, v, before, physics.step)
+            if substep % _DAMPED_EVERY == _DAMPED_EVERY - 1:
+                damp_springs(x, v, inverse_mass, topology.bend.pairs, physics.spring_damping)
+                damp_springs(x, v, inverse_mass, topology.stretch.pairs, physics.spring_damping)
+        if held >= 0:
+            inverse_mass[held] = _ONE
+        picker[:] = path[frame]
+        calm = calm + 1 if _is_slow(v, physics.settle_speed) else 0
+        if calm >= CALM_FRAMES and physics.settle_speed > _ZERO:
+            return frame + 1, held, calm
+    return len(path), held, calm
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _predict(x, v, before, inverse_mass, physics: Physics):
+    """Free flight of every vertex that is not held, no faster than the top speed."""
+    step, keep = physics.step, _ONE - physics.drag * physics.step
+    fall = physics.gravity * step
+    limit = physics.top_speed * physics.top_speed
+    for i in range(len(x)):
+        before[i, 0], before[i, 1], before[i, 2] = x[i, 0], x[i, 1], x[i, 2]
+        if inverse_mass[i] > _ZERO:
+            vx, vy, vz = v[i, 0] * keep, v[i, 1] * keep, (v[i, 2] - fall) * keep
+            square = vx * vx + vy * vy + vz * vz
+            way = step if square <= limit else step * physics.top_speed / math.sqrt(square)
+            x[i, 0] += way * vx
+            x[i, 1] += way * vy
+            x[i, 2] += way * vz
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _update_velocity(x, v, before, step):
+    rate = _ONE / step
+    for i in range(len(x)):
+        for axis in range(3):
+            v[i, axis] = (x[i, axis] - before[i, axis]) * rate
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _is_slow(v, speed):
+    fast = 0
+    for i in range(len(v)):
+        if v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] + v[i, 2] * v[i, 2] > speed * speed:
+            fast += 1
+    return fast * _CALM_SHARE <= len(v)
+
+
+@njit(cache=True, nogil=True)
+def _longest(colours):
+    longest = 0
+    for c in range(len(colours) - 1):
+        longest = max(longest, colours[c + 1] - colours[c])
+    return longest
