@@ -4,16 +4,17 @@ import time
 from functools import lru_cache
 
 import numpy as np
+
 from medor_cloth.cloth import Cloth
 from medor_cloth.errors import ClothError
+from medor_cloth.rollout import Cancelled as Stopped
 from medor_cloth.rollout import rollouts
 from medor_cloth.solver import Solver
+from medor_dynamics.rewards import rewards
 from medor_wire.bus import Call
 from medor_wire.content import ByContent
 from medor_wire.errors import BadRequest
 from medor_wire.messages import ClothMesh, RolloutProgress, RolloutRequest, Rollouts
-
-from medor_dynamics.rewards import rewards
 
 DIVERGED_PENALTY = 1e6
 """Taken off the reward of the unmoved cloth when a rollout left the finite numbers: never chosen, still comparable."""
@@ -36,16 +37,19 @@ class Physics:
         started = time.perf_counter()
         mesh, total = request.mesh, len(request.picks)
         solver = self._solver_of(by_rest_shape(mesh))
-        positions = rollouts(
-            solver,
-            mesh.vertices,
-            request.picks,
-            request.places,
-            threads=self._threads,
-            cancelled=call.cancelled,
-            on_done=lambda done: call.progress(RolloutProgress(done=done, total=total)),
-        )
-        call.check()
+        try:
+            positions = rollouts(
+                solver,
+                mesh.vertices,
+                request.picks,
+                request.places,
+                threads=self._threads,
+                cancelled=call.cancelled,
+                on_done=lambda done: call.progress(RolloutProgress(done=done, total=total)),
+            )
+        except Stopped:
+            call.check()
+            raise
         finite = np.isfinite(positions).all(axis=(1, 2))
         positions = np.where(finite[:, None, None], positions, mesh.vertices)
         scores = rewards(positions, mesh.faces, request.reward, threads=self._threads)

@@ -3,11 +3,12 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from numpy.typing import NDArray
+
 from medor_cloth.alignment import canonical_cost, canonical_cost_unmatched
 from medor_cloth.coverage import coverages
 from medor_wire.errors import BadRequest
 from medor_wire.messages import Reward
-from numpy.typing import NDArray
 
 
 def rewards(

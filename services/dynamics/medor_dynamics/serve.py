@@ -5,14 +5,13 @@ Stateless: any number of replicas share the candidates of one plan.
 
 import os
 
-from medor_wire import endpoints
-from medor_wire.config import Settings
-from medor_wire.zenoh_bus import join
-
 from medor_dynamics.flatten import Flattener
 from medor_dynamics.physics import Physics
 from medor_dynamics.roller import Roller
 from medor_dynamics.warm_up import warm_up
+from medor_wire import endpoints
+from medor_wire.config import Settings
+from medor_wire.zenoh_bus import join
 
 
 class Config(Settings, section="dynamics"):

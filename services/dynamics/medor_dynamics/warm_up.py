@@ -1,6 +1,7 @@
 """Compile everything a rollout needs before the first one is asked for."""
 
 import numpy as np
+
 from medor_cloth.cloth import Cloth
 from medor_cloth.coverage import coverages
 from medor_cloth.rollout import rollouts

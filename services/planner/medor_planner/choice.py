@@ -4,10 +4,10 @@ import uuid
 from dataclasses import dataclass
 
 import numpy as np
-from medor_wire.messages import ClothMesh, Plan, PlanRequest
 from numpy.typing import NDArray
 
 from medor_planner.sampling import Candidates
+from medor_wire.messages import ClothMesh, Plan, PlanRequest
 
 TOP = 20
 """Candidates reported with a plan."""

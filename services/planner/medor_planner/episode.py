@@ -3,6 +3,9 @@
 import time
 from dataclasses import dataclass
 
+from medor_planner.executor import Executor, Hand
+from medor_planner.methods import method_named
+from medor_planner.planner import Planner
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Call
 from medor_wire.errors import BadRequest, Unavailable
@@ -18,10 +21,6 @@ from medor_wire.messages import (
     Score,
     Task,
 )
-
-from medor_planner.executor import Executor, Hand
-from medor_planner.methods import method_named
-from medor_planner.planner import Planner
 
 
 class Episodes:

@@ -5,12 +5,11 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from medor_planner.plans import Plans
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Call
 from medor_wire.errors import LeaseHeld, MedorError, Unavailable
 from medor_wire.messages import ActOutcome, ActRequest, ExecuteRequest, Lease, LeaseRequest, Plan
-
-from medor_planner.plans import Plans
 
 log = logging.getLogger(__name__)
 

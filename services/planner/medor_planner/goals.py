@@ -4,13 +4,12 @@ import threading
 from functools import lru_cache
 
 from medor_cloth.garment import generate
+from medor_planner.methods import Method
 from medor_wire import endpoints
 from medor_wire.bus import Bus
 from medor_wire.content import ByContent
 from medor_wire.errors import BadRequest
 from medor_wire.messages import Category, ClothMesh, FlattenRequest, GoalSet, Reward
-
-from medor_planner.methods import Method
 
 TEMPLATE_SEED = 700_001
 """The garment that stands for its category when the mesh has no canonical pose; of the training seeds."""

@@ -3,6 +3,16 @@
 import threading
 
 import numpy as np
+from numpy.typing import NDArray
+
+from medor_planner.choice import Choice, no_op
+from medor_planner.goals import Goals
+from medor_planner.methods import Method, method_named
+from medor_planner.plans import Plans
+from medor_planner.random_policy import random_action
+from medor_planner.sampling import Candidates, Scene, sample
+from medor_planner.shooting import CHUNK, Shooting
+from medor_planner.watching import Stages, cancelling
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Call
 from medor_wire.errors import BadRequest
@@ -17,16 +27,6 @@ from medor_wire.messages import (
     Reward,
     RolloutRequest,
 )
-from numpy.typing import NDArray
-
-from medor_planner.choice import Choice, no_op
-from medor_planner.goals import Goals
-from medor_planner.methods import Method, method_named
-from medor_planner.plans import Plans
-from medor_planner.random_policy import random_action
-from medor_planner.sampling import Candidates, Scene, sample
-from medor_planner.shooting import CHUNK, Shooting
-from medor_planner.watching import Stages, cancelling
 
 
 class Planner:

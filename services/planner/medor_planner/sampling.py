@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
 from medor_cloth.camera import Camera
 from medor_wire.errors import NoGarment, OutOfReach, ReconstructionFailed
 from medor_wire.messages import ClothMesh, DepthView
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 MARGIN = 30 / 720
 """Margin around the garment's bounding box, in image widths (30 px of 720)."""

@@ -3,15 +3,14 @@
 Plans run beside each other; actions and episodes one at a time, since there is one robot.
 """
 
-from medor_wire import endpoints
-from medor_wire.config import Settings
-from medor_wire.zenoh_bus import join
-
 from medor_planner.episode import Episodes
 from medor_planner.executor import Executor
 from medor_planner.planner import Planner
 from medor_planner.plans import Plans
 from medor_planner.shooting import CHUNK
+from medor_wire import endpoints
+from medor_wire.config import Settings
+from medor_wire.zenoh_bus import join
 
 
 class Config(Settings, section="planner"):

@@ -11,11 +11,12 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
+
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Instance
 from medor_wire.errors import Busy, Cancelled, InternalError, MedorError, Unavailable
 from medor_wire.messages import RolloutRequest
-from numpy.typing import NDArray
 
 log = logging.getLogger(__name__)
 

@@ -1,0 +1,139 @@
+import numpy as np
+import pytest
+
+from medor_planner.random_policy import CLEARANCE_M, random_action
+from medor_planner.sampling import LENGTHS_M, PICKER_ABOVE_M, Scene, anywhere, pulls, sample
+from medor_wire.errors import NoGarment, OutOfReach, ReconstructionFailed
+from scipy.spatial import cKDTree
+
+
+@pytest.fixture
+def scene(sheet_scene) -> Scene:
+    """A sheet of 20 x 24 cm whose right third is folded over, so that much of it is hidden."""
+    return sheet_scene(folded=True)
+
+
+def rng(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def test_every_pick_is_a_visible_vertex_one_centimetre_up(scene):
+    candidates = sample(scene, 400, rng(), reachable=anywhere)
+    assert len(candidates) == 400
+    assert 0 < scene.mesh.visible.sum() < len(scene.visible) + 20
+    assert not scene.mesh.visible.all()
+    visible = {tuple(v) for v in scene.visible + np.float32([0, 0, PICKER_ABOVE_M])}
+    assert {tuple(pick) for pick in candidates.picks} <= visible
+
+
+def test_every_place_is_in_view_level_or_higher_and_5_to_20_cm_away(scene):
+    candidates = sample(scene, 2000, rng(), reachable=anywhere)
+    way = candidates.places - candidates.picks
+    length = np.linalg.norm(way, axis=1)
+    assert scene.camera.contains(candidates.places).all()
+    assert (way[:, 2] >= 0).all()
+    assert LENGTHS_M[0] - 1e-6 <= length.min() < 0.06
+    assert 0.18 < length.max() <= LENGTHS_M[1] + 1e-6
+
+
+def test_places_near_the_rim_of_the_view_point_inwards(sheet_scene):
+    scene = sheet_scene(centre=(0.16, 0.0))
+    candidates = sample(scene, 1000, rng(), reachable=anywhere)
+    assert scene.camera.contains(candidates.places).all()
+    assert (candidates.places - candidates.picks)[:, 0].mean() < -0.01
+
+
+def test_the_outline_is_picked_more_often_than_the_inside(scene):
+    sheet = Scene(scene.mesh, scene.view)
+    candidates = sample(sheet, 4000, rng(), reachable=anywhere)
+    tree = cKDTree(sheet.visible + np.float32([0, 0, PICKER_ABOVE_M]))
+    _, vertex = tree.query(candidates.picks)
+    per_vertex = np.bincount(vertex, minlength=len(sheet.visible))
+    low, high = sheet.visible[:, :2].min(axis=0), sheet.visible[:, :2].max(axis=0)
+    outline = ((sheet.visible[:, :2] < low + 1e-4) | (sheet.visible[:, :2] > high - 1e-4)).any(axis=1)
+    assert per_vertex[outline].mean() > 1.5 * per_vertex[~outline].mean()
+
+
+def test_pixels_beside_the_cloth_meet_the_scene_5_mm_over_the_table(scene):
+    beside = np.array([[2, 2], [scene.camera.width - 3, 5]])
+    assert scene.view.depth[beside[:, 1], beside[:, 0]].max() == 0
+    points = scene.surface(beside)
+    np.testing.assert_allclose(points[:, 2], 0.005, atol=1e-9)
+    np.testing.assert_allclose(scene.camera.project(points)[0], beside + 0.5, atol=1e-6)
+
+
+def test_pixels_on_the_cloth_are_back_projected_with_their_depth(scene):
+    rows, columns = np.nonzero(scene.view.depth)
+    points = scene.surface(np.stack([columns, rows], axis=1))
+    np.testing.assert_allclose(points, scene.camera.back_project(scene.view.depth)[rows, columns], atol=1e-6)
+
+
+def test_depth_off_the_mask_is_not_cloth(scene):
+    masked = scene.view.model_copy(update={"mask": np.zeros_like(scene.view.depth, bool)})
+    rows, columns = np.nonzero(scene.view.depth)
+    points = Scene(scene.mesh, masked).surface(np.stack([columns, rows], axis=1))
+    np.testing.assert_allclose(points[:, 2], 0.005, atol=1e-9)
+
+
+def test_the_box_has_a_margin_of_a_24th_of_the_image(scene):
+    uv, _ = scene.camera.project(scene.mesh.vertices)
+    low, high = scene.box
+    margin = scene.camera.width / 24
+    assert np.abs(uv.min(axis=0) - margin - low).max() <= 1
+    assert np.abs(uv.max(axis=0) + margin - high).max() <= 1
+
+
+def test_both_ends_are_within_reach_and_reach_is_asked_once_when_all_of_it_is(scene):
+    asked = []
+
+    def left_half(points):
+        asked.append(len(points))
+        return points[:, 0] < 0.02
+
+    candidates = sample(scene, 300, rng(), reachable=left_half)
+    assert len(candidates) == 300
+    assert max(candidates.picks[:, 0].max(), candidates.places[:, 0].max()) < 0.02
+    asked.clear()
+    sample(scene, 300, rng(), reachable=lambda points: asked.append(len(points)) or anywhere(points))
+    assert asked == [600]
+
+
+def test_same_seed_same_candidates(scene):
+    one, two, other = (sample(scene, 50, rng(seed), reachable=anywhere) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(one.picks, two.picks)
+    np.testing.assert_array_equal(one.places, two.places)
+    assert (one.places != other.places).any()
+
+
+def test_headings_are_uniform_in_the_plane():
+    way = pulls(4000, 1, rng())[:, 0]
+    assert np.abs(way[:, :2].mean(axis=0)).max() < 0.005
+    assert way[:, 2].min() >= 0
+
+
+def test_nothing_in_reach_is_said_so(scene):
+    with pytest.raises(OutOfReach):
+        sample(scene, 5, rng(), reachable=lambda points: ~anywhere(points))
+
+
+def test_a_garment_outside_the_image_is_said_so(sheet_scene):
+    scene = sheet_scene()
+    away = scene.mesh.model_copy(update={"vertices": scene.mesh.vertices + np.float32([1, 0, 0])})
+    with pytest.raises(NoGarment):
+        sample(Scene(away, scene.view), 5, rng(), reachable=anywhere)
+
+
+def test_a_mesh_without_visible_vertices_is_said_so(sheet_scene):
+    scene = sheet_scene()
+    hidden = scene.mesh.model_copy(update={"visible": np.zeros(len(scene.mesh.vertices), bool)})
+    with pytest.raises(ReconstructionFailed):
+        sample(Scene(hidden, scene.view), 5, rng(), reachable=anywhere)
+
+
+def test_the_random_policy_places_off_the_cloth(scene):
+    for seed in range(20):
+        action = random_action(scene, rng(seed), anywhere)
+        distance, _ = cKDTree(scene.mesh.vertices[:, :2]).query(action.places[:, :2])
+        assert len(action) == 1
+        assert distance[0] > CLEARANCE_M
+        assert scene.camera.contains(action.places).all()
