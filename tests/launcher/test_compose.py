@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from medor_wire.compose import ComposeError, find, interpolate, read, replicas
 
 COMPOSE = """

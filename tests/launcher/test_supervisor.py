@@ -11,6 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+
 from medor_wire import supervisor
 from medor_wire.supervisor import LONGEST_PAUSE_S, Process, Supervisor
 

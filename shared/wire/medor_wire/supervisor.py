@@ -20,6 +20,8 @@ HEALTHY_S = 10.0
 """Having run this long, a process that ends is restarted after the first pause again."""
 GRACE_S = 3.0
 """Between SIGTERM and SIGKILL."""
+READ_S = 0.5
+"""For the last words of a process that has ended."""
 TICK_S = 0.05
 
 Sink = Callable[[str, str], None]
@@ -36,6 +38,7 @@ class Process:
     folder: Path
     sink: Sink
     child: subprocess.Popen[str] | None = None
+    reader: threading.Thread | None = None
     starts: int = 0
     exit_codes: list[int] = field(default_factory=list)
     """Of every run that has ended; negative for a signal."""
@@ -86,7 +89,10 @@ class Process:
         )
         self.starts += 1
         self.started_at = now
-        threading.Thread(target=self._stream, args=(self.child,), name=f"output of {self.name}", daemon=True).start()
+        self.reader = threading.Thread(
+            target=self._stream, args=(self.child,), name=f"output of {self.name}", daemon=True
+        )
+        self.reader.start()
 
     def _ended(self, code: int, now: float) -> None:
         self.signal_group(signal.SIGKILL)  # what it started must not outlive it
@@ -151,6 +157,8 @@ class Supervisor:
             if process.child is not None:
                 process.exit_codes.append(process.child.wait())
                 process.child = None
+            if process.reader is not None:
+                process.reader.join(READ_S)
 
 
 def describe(code: int) -> str:
