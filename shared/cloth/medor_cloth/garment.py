@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from medor_cloth.errors import GarmentError
 from medor_cloth.inflate import inflate
 from medor_cloth.intersection import self_intersections
-from medor_cloth.layout import laid_from_panels, squashed
+from medor_cloth.layout import lay_flat
 from medor_cloth.panels import PATTERNS
 from medor_cloth.sewing import Sewn, sew
 from medor_cloth.topology import topology
@@ -49,9 +49,7 @@ class Garment:
         Returns:
             (V, 3) task space [m], body up = world +y, centred on the origin; layers apart and none crossing.
         """
-        if self.panel_uv is None:
-            return squashed(self.vertices)
-        return laid_from_panels(self.faces, self.panel_uv, len(self.vertices))
+        return lay_flat(self.vertices, self.faces, self.panel_uv)
 
 
 def generate(category: str, seed: int, edge_m: float = 0.012) -> Garment:

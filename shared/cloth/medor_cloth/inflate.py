@@ -1,7 +1,8 @@
-"""The worn shape of a sewn garment: blown up from flat panels until the cloth, not its drawing, gives the form.
+"""The worn shape of a sewn garment, blown up from its flat panels.
 
-The panels start in their flat places, bulged apart by a Poisson height, and follow a fixed number of steps of projective
-dynamics (Bouaziz et al. 2014): springs towards the panels' edge lengths, quadratic bending, a slight pressure.
+The panels start in their flat places, bulged apart by a Poisson height, and follow a fixed number of steps of
+projective dynamics (Bouaziz et al. 2014): springs towards the panels' edge lengths, quadratic bending, a slight
+pressure.
 """
 
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu, spsolve
+from scipy.sparse.linalg import splu
 
 from medor_cloth.pattern import Pattern
 from medor_cloth.sewing import Sewn
@@ -161,6 +162,6 @@ def _bulge(sewn: Sewn, pattern: Pattern, laplacian: sparse.csr_array, area: NDAr
         if pattern.panels[seam.first[0]].front != pattern.panels[seam.second[0]].front:
             free[sewn.vertex[sewn.edges[seam.first]]] = False
     height = np.zeros(sewn.n_vertices)
-    height[free] = spsolve(laplacian[free][:, free].tocsc(), area[free])
+    height[free] = splu(laplacian[free][:, free].tocsc()).solve(area[free])
     side = np.sign(sewn.mean(np.where(sewn.front, 1.0, -1.0)))
     return side * BULGE * np.sqrt(np.maximum(2 * height, 0.0))

@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 PARALLEL = 1e-18
 """Determinants below this count as an edge parallel to the triangle [m³]."""
@@ -28,7 +28,7 @@ def _close_pairs(corners: NDArray, faces: NDArray) -> NDArray:
     """(N, 2) pairs of faces whose bounding boxes overlap and that share no vertex."""
     centres = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centres[:, None], axis=2).max()
-    pairs = cKDTree(centres).query_pairs(2 * radius, output_type="ndarray")
+    pairs = KDTree(centres).query_pairs(2 * radius, output_type="ndarray")
     low, high = corners.min(axis=1), corners.max(axis=1)
     a, b = pairs.T
     pairs = pairs[((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1)]

@@ -11,23 +11,30 @@ CLEARANCE_M = 0.0025
 """Height of the lowest layer's middle surface above the table: half the cloth's thickness."""
 SQUASHED_M = 0.015
 """Height of a squashed worn shape, whose layers are not known."""
+DISAGREEMENT = 0.4
+"""Largest difference of a layout from the worn shape over the shape's spread; generated garments stay below 0.25."""
 
 
-def laid_from_panels(faces: NDArray, panel_uv: NDArray, n_vertices: int) -> NDArray[np.float32]:
-    """Lay a generated garment flat: front panels above back panels, seams halfway between.
+def lay_flat(vertices: NDArray, faces: NDArray, panel_uv: NDArray | None) -> NDArray[np.float32]:
+    """Lay a worn garment flat, front up.
+
+    From its panels where they stand upright and side by side as they are worn (a user's panels may be packed in any
+    way); otherwise the worn shape is squashed.
 
     Args:
-        faces: (F, 3).
-        panel_uv: (F, 3, 2) [m], upright panels; counter-clockwise on the front, clockwise on the back.
-        n_vertices: V.
+        vertices: (V, 3) canonical space [m].
+        faces: (F, 3), wound outwards.
+        panel_uv: (F, 3, 2) [m] or None.
 
     Returns:
-        (V, 3) task space [m]: panel y along world +y, bounding box centred on the origin.
+        (V, 3) task space [m]: body up along world +y, bounding box centred on the origin.
     """
-    plane = _stitched(faces, panel_uv.astype(np.float64), n_vertices)
-    plane -= (plane.max(axis=0) + plane.min(axis=0)) / 2
-    height = CLEARANCE_M + LAYER_GAP_M * (1 + _side(faces, panel_uv, n_vertices)) / 2
-    return np.column_stack([plane, height]).astype(np.float32)
+    if panel_uv is not None:
+        plane = _stitched(faces, panel_uv.astype(np.float64), len(vertices))
+        if _agree(plane, vertices[:, [0, 2]]):
+            height = CLEARANCE_M + LAYER_GAP_M * (1 + _side(faces, panel_uv, len(vertices))) / 2
+            return np.column_stack([_centred(plane), height]).astype(np.float32)
+    return squashed(vertices)
 
 
 def squashed(vertices: NDArray) -> NDArray[np.float32]:
@@ -36,10 +43,20 @@ def squashed(vertices: NDArray) -> NDArray[np.float32]:
     Returns:
         (V, 3) task space [m], bounding box centred on the origin.
     """
-    x, y, z = (np.asarray(vertices, np.float64) - np.mean([vertices.min(axis=0), vertices.max(axis=0)], axis=0)).T
-    squash = SQUASHED_M / max(float(np.ptp(y)), 1e-9)
-    height = CLEARANCE_M + (y.max() - y) * min(squash, 1.0)
-    return np.column_stack([x, z, height]).astype(np.float32)
+    y = np.asarray(vertices[:, 1], np.float64)
+    squash = min(1.0, SQUASHED_M / max(float(np.ptp(y)), 1e-9))
+    height = CLEARANCE_M + (y.max() - y) * squash
+    return np.column_stack([_centred(vertices[:, [0, 2]]), height]).astype(np.float32)
+
+
+def _centred(plane: NDArray) -> NDArray[np.float64]:
+    return plane - (plane.max(axis=0) + plane.min(axis=0)) / 2.0
+
+
+def _agree(plane: NDArray, worn: NDArray) -> bool:
+    """Whether a layout is the worn shape seen from the front, up to the change from round to flat."""
+    difference = (plane - plane.mean(axis=0)) - (worn - worn.mean(axis=0))
+    return bool((difference**2).sum() < DISAGREEMENT**2 * ((worn - worn.mean(axis=0)) ** 2).sum())
 
 
 def _side(faces: NDArray, panel_uv: NDArray, n: int) -> NDArray[np.float64]:

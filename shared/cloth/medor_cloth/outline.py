@@ -1,5 +1,7 @@
 """Plane curves from which garment panels are drawn: polylines (n, 2) in metres, x lateral, y up."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -28,7 +30,7 @@ def bezier(*controls: ArrayLike, samples: int = 24) -> Curve:
     t = np.linspace(0.0, 1.0, samples)[:, None]
     layers = [np.broadcast_to(np.asarray(c, np.float64), (samples, 2)) for c in controls]
     while len(layers) > 1:
-        layers = [(1 - t) * a + t * b for a, b in zip(layers, layers[1:], strict=False)]
+        layers = [(1 - t) * a + t * b for a, b in pairwise(layers)]
     return layers[0]
 
 
@@ -45,7 +47,7 @@ def mirror(curve: Curve) -> Curve:
 def fillet(start: ArrayLike, corner: ArrayLike, end: ArrayLike, radius: float) -> Curve:
     """The path start → corner → end with the corner rounded over at most `radius` on each side."""
     a, b, c = (np.asarray(p, np.float64) for p in (start, corner, end))
-    before, after = np.linalg.norm(a - b), np.linalg.norm(c - b)
+    before, after = float(np.linalg.norm(a - b)), float(np.linalg.norm(c - b))
     radius = min(radius, 0.45 * before, 0.45 * after)
     enter, leave = b + radius * (a - b) / before, b + radius * (c - b) / after
     return join(line(a, enter), bezier(enter, b, leave, samples=12), line(leave, c))

@@ -6,7 +6,7 @@ outline's own samples stay where they are, so that seams match.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import Delaunay, KDTree
 
 Points = NDArray[np.float64]
 Triangles = NDArray[np.int64]
@@ -29,7 +29,7 @@ def triangulate(outline: Points, edge: float, rng: np.random.Generator) -> tuple
         Points (P, 2), the outline first, and counter-clockwise triangles (T, 3). No inner edge joins two points of
         the outline: sewn to another panel with the same edge it would carry four faces.
     """
-    rim = cKDTree(np.vstack([outline, (outline + np.roll(outline, -1, axis=0)) / 2]))
+    rim = KDTree(np.vstack([outline, (outline + np.roll(outline, -1, axis=0)) / 2]))
     inner = _lattice(outline, edge, rng)
     inner = inner[rim.query(inner)[0] > 0.62 * edge]
     inner = _relax(outline, inner, edge, rim)
@@ -63,7 +63,7 @@ def _lattice(outline: Points, edge: float, rng: np.random.Generator) -> Points:
     return lattice[contains(outline, lattice)]
 
 
-def _relax(outline: Points, inner: Points, edge: float, rim: cKDTree) -> Points:
+def _relax(outline: Points, inner: Points, edge: float, rim: KDTree) -> Points:
     n_rim = len(outline)
     pairs = np.empty((0, 2), np.int64)
     for step in range(RELAXATIONS):
@@ -83,12 +83,11 @@ def _repulsion(points: Points, pairs: NDArray[np.int64], reach: float) -> Points
     apart = points[pairs[:, 0]] - points[pairs[:, 1]]
     size = np.linalg.norm(apart, axis=1, keepdims=True)
     push = np.maximum(reach - size, 0.0) / size * apart
-    return np.column_stack(
-        [
-            np.bincount(pairs[:, 0], push[:, d], len(points)) - np.bincount(pairs[:, 1], push[:, d], len(points))
-            for d in (0, 1)
-        ]
-    )
+    force = np.zeros_like(points)
+    for d in (0, 1):
+        force[:, d] = np.bincount(pairs[:, 0], push[:, d], len(points))
+        force[:, d] -= np.bincount(pairs[:, 1], push[:, d], len(points))
+    return force
 
 
 def _delaunay(points: Points, outline: Points, edge: float) -> Triangles:

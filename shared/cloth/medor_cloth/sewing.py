@@ -40,7 +40,7 @@ class Sewn:
 
     def total(self, values: NDArray) -> NDArray[np.float64]:
         """(V,) sum over the points of each vertex of `values` (P,)."""
-        return np.bincount(self.vertex, values, self.n_vertices)
+        return np.asarray(np.bincount(self.vertex, values, self.n_vertices), np.float64)
 
 
 def sew(pattern: Pattern, edge: float, rng: np.random.Generator) -> Sewn:
