@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from medor_planner.random_policy import CLEARANCE_M, random_action
 from medor_planner.sampling import LENGTHS_M, PICKER_ABOVE_M, Scene, anywhere, pulls, sample
 from medor_wire.errors import NoGarment, OutOfReach, ReconstructionFailed
-from scipy.spatial import cKDTree
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def test_every_pick_is_a_visible_vertex_one_centimetre_up(scene):
     assert len(candidates) == 400
     assert 0 < scene.mesh.visible.sum() < len(scene.visible) + 20
     assert not scene.mesh.visible.all()
-    visible = {tuple(v) for v in scene.visible + np.float32([0, 0, PICKER_ABOVE_M])}
+    visible = {tuple(v) for v in scene.visible + np.array([0, 0, PICKER_ABOVE_M], np.float32)}
     assert {tuple(pick) for pick in candidates.picks} <= visible
 
 
@@ -46,7 +46,7 @@ def test_places_near_the_rim_of_the_view_point_inwards(sheet_scene):
 def test_the_outline_is_picked_more_often_than_the_inside(scene):
     sheet = Scene(scene.mesh, scene.view)
     candidates = sample(sheet, 4000, rng(), reachable=anywhere)
-    tree = cKDTree(sheet.visible + np.float32([0, 0, PICKER_ABOVE_M]))
+    tree = KDTree(sheet.visible + np.array([0, 0, PICKER_ABOVE_M], np.float32))
     _, vertex = tree.query(candidates.picks)
     per_vertex = np.bincount(vertex, minlength=len(sheet.visible))
     low, high = sheet.visible[:, :2].min(axis=0), sheet.visible[:, :2].max(axis=0)
@@ -118,7 +118,7 @@ def test_nothing_in_reach_is_said_so(scene):
 
 def test_a_garment_outside_the_image_is_said_so(sheet_scene):
     scene = sheet_scene()
-    away = scene.mesh.model_copy(update={"vertices": scene.mesh.vertices + np.float32([1, 0, 0])})
+    away = scene.mesh.model_copy(update={"vertices": scene.mesh.vertices + np.array([1, 0, 0], np.float32)})
     with pytest.raises(NoGarment):
         sample(Scene(away, scene.view), 5, rng(), reachable=anywhere)
 
@@ -133,7 +133,7 @@ def test_a_mesh_without_visible_vertices_is_said_so(sheet_scene):
 def test_the_random_policy_places_off_the_cloth(scene):
     for seed in range(20):
         action = random_action(scene, rng(seed), anywhere)
-        distance, _ = cKDTree(scene.mesh.vertices[:, :2]).query(action.places[:, :2])
+        distance, _ = KDTree(scene.mesh.vertices[:, :2]).query(action.places[:, :2])
         assert len(action) == 1
         assert distance[0] > CLEARANCE_M
         assert scene.camera.contains(action.places).all()

@@ -50,12 +50,12 @@ class Physics:
         except Stopped:
             call.check()
             raise
-        finite = np.isfinite(positions).all(axis=(1, 2))
-        positions = np.where(finite[:, None, None], positions, mesh.vertices)
+        diverged = ~np.isfinite(positions).reshape(total, -1).all(axis=1)
+        positions[diverged] = mesh.vertices
         scores = rewards(positions, mesh.faces, request.reward, threads=self._threads)
         return Rollouts(
             positions=positions,
-            rewards=scores - DIVERGED_PENALTY * ~finite,
+            rewards=scores - DIVERGED_PENALTY * diverged,
             seconds=time.perf_counter() - started,
         )
 

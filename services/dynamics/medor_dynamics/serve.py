@@ -10,8 +10,8 @@ from medor_dynamics.physics import Physics
 from medor_dynamics.roller import Roller
 from medor_dynamics.warm_up import warm_up
 from medor_wire import endpoints
+from medor_wire.bus import join
 from medor_wire.config import Settings
-from medor_wire.zenoh_bus import join
 
 
 class Config(Settings, section="dynamics"):

@@ -1,7 +1,6 @@
 """Closed loop: look, plan, act, score, until the garment is done or the picks are used up (MEDOR, section V)."""
 
 import time
-from dataclasses import dataclass
 
 from medor_planner.executor import Executor, Hand
 from medor_planner.methods import method_named
@@ -15,8 +14,6 @@ from medor_wire.messages import (
     EpisodePick,
     EpisodeProgress,
     EpisodeRequest,
-    Message,
-    PlanProgress,
     PlanRequest,
     Score,
     Task,
@@ -72,7 +69,9 @@ class Episodes:
             candidates=request.candidates,
             seed=request.seed,
         )
-        plan = self._planner.plan(asked, Planning(call), pick_index=index)
+        plan = self._planner.plan_pick(
+            asked, index, call, lambda progress: call.progress(EpisodeProgress(planning=progress))
+        )
         call.check()
         planned = time.perf_counter()
         hand.act(plan)
@@ -112,24 +111,3 @@ def check(request: EpisodeRequest) -> None:
 def improvement(score: Score, task: Task) -> float:
     """Normalized improvement of the task."""
     return score.ni_flatten if task == "flatten" else score.ni_canonicalize
-
-
-@dataclass(frozen=True)
-class Planning:
-    """An episode's call as a plan inside it sees it: the plan's progress becomes the episode's."""
-
-    call: Call
-
-    @property
-    def request_id(self) -> str:
-        return self.call.request_id
-
-    def progress(self, message: Message) -> None:
-        if isinstance(message, PlanProgress):
-            self.call.progress(EpisodeProgress(planning=message))
-
-    def cancelled(self) -> bool:
-        return self.call.cancelled()
-
-    def check(self) -> None:
-        self.call.check()

@@ -1,6 +1,7 @@
 """The planner: one observation in, the pick-and-place with the best predicted reward out (MEDOR, section IV-C)."""
 
 import threading
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from medor_wire.messages import (
     DepthView,
     Empty,
     Plan,
+    PlanProgress,
     PlanRequest,
     ReachRequest,
     ReconstructRequest,
@@ -38,10 +40,15 @@ class Planner:
         self._goals = Goals(bus)
         self._chunk = chunk
 
-    def plan(self, request: PlanRequest, call: Call, pick_index: int = 0) -> Plan:
+    def plan(self, request: PlanRequest, call: Call) -> Plan:
         """The best of `request.candidates` sampled actions, or doing nothing when that is predicted best.
 
-        The same request and `pick_index` (the number of the pick in an episode) give the same action.
+        The same request and cell give the same action. Raises what `plan_pick` does.
+        """
+        return self.plan_pick(request, 0, call, call.progress)
+
+    def plan_pick(self, request: PlanRequest, index: int, call: Call, tell: Callable[[PlanProgress], None]) -> Plan:
+        """`plan` for one pick of an episode: every `index` draws other candidates.
 
         Raises:
             BadRequest: unknown method, or another category on the table.
@@ -49,8 +56,8 @@ class Planner:
             Unavailable: a service that is needed does not answer.
         """
         method = method_named(request.method)
-        rng = np.random.default_rng([request.seed, pick_index])
-        stages = Stages(call)
+        rng = np.random.default_rng([request.seed, index])
+        stages = Stages(call, tell)
         with cancelling(call) as cancel:
             with stages.stage("capture"):
                 view = request.view or self._bus.ask(endpoints.CAPTURE, Empty(), cancel=cancel)

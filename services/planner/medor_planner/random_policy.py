@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from medor_planner.sampling import Candidates, Scene, Test, sample
 
@@ -25,8 +25,8 @@ class OffTheCloth:
     scene: Scene
 
     @cached_property
-    def _nearest(self) -> cKDTree:
-        return cKDTree(self.scene.mesh.vertices[:, :2])
+    def _nearest(self) -> KDTree:
+        return KDTree(self.scene.mesh.vertices[:, :2])
 
     def __call__(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
         distance, _ = self._nearest.query(points[..., :2])

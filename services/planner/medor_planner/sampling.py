@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from medor_cloth.camera import Camera
 from medor_wire.errors import NoGarment, OutOfReach, ReconstructionFailed
@@ -76,8 +76,8 @@ def sample(
     found = NOTHING
     for _ in range(ROUNDS):
         proposed = scene.propose(count - len(found), rng, place_allowed)
-        in_reach = reachable(np.concatenate([proposed.picks, proposed.places])).reshape(2, -1).all(axis=0)
-        found += proposed.where(in_reach)
+        pick_reached, place_reached = np.split(reachable(np.concatenate([proposed.picks, proposed.places])), 2)
+        found += proposed.where(pick_reached & place_reached)
         if len(found) == count:
             return found
     if not len(found):
@@ -105,8 +105,8 @@ class Scene:
         return self.mesh.vertices[self.mesh.visible]
 
     @cached_property
-    def _nearest_visible(self) -> cKDTree:
-        return cKDTree(self.visible)
+    def _nearest_visible(self) -> KDTree:
+        return KDTree(self.visible)
 
     @cached_property
     def box(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -126,12 +126,14 @@ class Scene:
         picks = self.snap(self.surface(rng.integers(low, high, size=(count, 2))))
         places = picks[:, None] + pulls(count, DIRECTIONS_PER_PICK, rng)
         fits = self.camera.contains(places) & place_allowed(places)
-        return Candidates(picks, places[np.arange(count), fits.argmax(axis=1)]).where(fits.any(axis=1))
+        first = fits.argmax(axis=1)
+        every = np.arange(count)
+        return Candidates(picks, places[every, first]).where(fits[every, first])
 
     def snap(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
         """Picker centres over the visible vertices nearest to points (N, 3)."""
         _, nearest = self._nearest_visible.query(points)
-        return self.visible[nearest] + np.float32([0, 0, PICKER_ABOVE_M])
+        return self.visible[nearest] + np.array([0, 0, PICKER_ABOVE_M], np.float32)
 
     def surface(self, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
         """World points (N, 3) [m] seen at pixels (N, 2) = (u, v): on the cloth, or 5 mm over the table beside it."""

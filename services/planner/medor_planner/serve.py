@@ -9,8 +9,8 @@ from medor_planner.planner import Planner
 from medor_planner.plans import Plans
 from medor_planner.shooting import CHUNK
 from medor_wire import endpoints
+from medor_wire.bus import join
 from medor_wire.config import Settings
-from medor_wire.zenoh_bus import join
 
 
 class Config(Settings, section="planner"):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Instance
 from medor_wire.errors import Busy, Cancelled, InternalError, MedorError, Unavailable
-from medor_wire.messages import RolloutRequest
+from medor_wire.messages import Message, RolloutProgress, RolloutRequest
 
 log = logging.getLogger(__name__)
 
@@ -125,12 +125,17 @@ class Shooting:
         request = self._request.model_copy(
             update={"picks": self._request.picks[chunk], "places": self._request.places[chunk]}
         )
+
+        def tell(progress: Message) -> None:
+            if isinstance(progress, RolloutProgress):
+                self._progress(index, progress.done)
+
         reply = self._bus.ask(
             endpoints.ROLLOUT,
             request,
             instance=instance,
             cancel=self._stop,
-            on_progress=lambda progress: self._progress(index, progress.done),
+            on_progress=tell,
         )
         return reply.rewards
 

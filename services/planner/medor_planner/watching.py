@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Literal
 
@@ -18,8 +18,9 @@ Stage = Literal["capture", "reconstruct", "goals", "sample", "rollout"]
 class Stages:
     """Progress and time of a plan's stages, one after another."""
 
-    def __init__(self, call: Call) -> None:
+    def __init__(self, call: Call, tell: Callable[[PlanProgress], None]) -> None:
         self._call = call
+        self._tell = tell
         self._start = time.perf_counter()
         self.timings_ms: dict[str, float] = {}
 
@@ -33,7 +34,7 @@ class Stages:
         self.report(name, 1.0)
 
     def report(self, name: Stage, fraction: float) -> None:
-        self._call.progress(PlanProgress(stage=name, fraction=fraction))
+        self._tell(PlanProgress(stage=name, fraction=fraction))
 
     def total(self) -> dict[str, float]:
         """All timings [ms], `total` among them."""
