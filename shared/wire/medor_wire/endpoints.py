@@ -39,6 +39,8 @@ class Topic(Generic[Content]):
 
     name: str
     content: type[Content]
+    urgent: bool = False
+    """Overtakes everything else on the wire."""
 
 
 RECONSTRUCT = Endpoint("recon/reconstruct", m.ReconstructRequest, m.Reconstruction, timeout_s=30)
@@ -84,6 +86,6 @@ DEPTH = Topic("sensor/depth", m.DepthView)
 MESH = Topic("mesh", m.ClothMesh)
 CELL = Topic("cell", m.CellStatus)
 ACTION = Topic("action", m.ActOutcome)
-STOP = Topic("safety/estop", m.EmergencyStop)
+STOP = Topic("safety/estop", m.EmergencyStop, urgent=True)
 
 TOPICS = (DEPTH, MESH, CELL, ACTION, STOP)

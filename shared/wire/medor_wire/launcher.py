@@ -103,7 +103,7 @@ class Launcher:
         }
         program, *arguments = replica.command
         command = [sys.executable if program == "python" else program, *arguments]
-        environment = {**given, **replica.environment, **addresses}
+        environment = {"MEDOR_BUS__LOG": "console", **given, **replica.environment, **addresses}
         return Process(replica.name, command, environment, folder, self.output.line)
 
     def start(self) -> Self:

@@ -36,11 +36,11 @@ class Output:
         """One line of one process."""
         with self._lock:
             file = self._files.get(name) or self._begin(name)
-            file.write(text + "\n")
+            line = Text.from_ansi(text)
+            file.write(line.plain + "\n")
             if self.echo:
                 colour = COLOURS[list(self._files).index(name) % len(COLOURS)]
-                prefix = Text(f"{name:>10} | ", style=colour)
-                self.console.print(prefix + Text.from_ansi(text), soft_wrap=True)
+                self.console.print(Text(f"{name:>10} | ", style=colour) + line, soft_wrap=True)
 
     def say(self, text: str) -> None:
         """A word of the launcher itself."""

@@ -4,14 +4,14 @@ A router of its own is the process `python -m medor_wire.router`; the launcher h
 """
 
 import contextlib
-import json
 import signal
 import threading
 from collections.abc import Iterator
 
 import zenoh
 
-from medor_wire.config import Settings
+from medor_wire.config import BusConfig, Settings
+from medor_wire.zenoh_config import router_config
 
 CLOSE_S = 1.0
 """Closing a session can hang on a stuck peer; nothing is lost by not waiting longer."""
@@ -22,33 +22,15 @@ class Config(Settings, section="router"):
     """Zenoh endpoint to listen on. Whoever reaches it can move the robot: loopback unless the network is trusted."""
 
 
-def configuration(listen: str) -> zenoh.Config:
-    """A router that listens on `listen` and nowhere else, finds nobody by itself and sees a dead client in 2 s."""
-    config = zenoh.Config()
-    for key, value in {
-        "mode": "router",
-        "listen/endpoints": [listen],
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "adminspace/enabled": False,
-        "transport/unicast/max_sessions": 256,
-        "transport/unicast/accept_timeout": 2000,
-        "transport/link/tx/lease": 2000,
-        "transport/link/tx/keep_alive": 4,
-        "transport/link/rx/max_message_size": 128 << 20,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
-    return config
-
-
 @contextlib.contextmanager
-def routing(listen: str) -> Iterator[None]:
-    """Routes between the clients of `listen` while the context lasts.
+def routing(listen: str, bus: BusConfig | None = None) -> Iterator[None]:
+    """Routes between the clients of `listen` while the context lasts; `bus` says whether with TLS.
 
     Raises:
         zenoh.ZError: the address cannot be listened on.
     """
-    session = zenoh.open(configuration(listen))
+    bus = bus or BusConfig()
+    session = zenoh.open(router_config(listen, shared_memory=bus.shared_memory, tls=bus.tls))
     try:
         yield
     finally:
@@ -62,7 +44,7 @@ def main(config: Config) -> None:
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
-    with routing(config.listen):
+    with routing(config.listen, config.bus):
         stop.wait()
 
 

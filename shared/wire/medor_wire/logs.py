@@ -1,0 +1,47 @@
+"""Logs: JSON lines, or readable on a terminal; one line per request. Everything goes to stderr."""
+
+import logging
+import sys
+from typing import Any, Literal
+
+import structlog
+
+
+def configure(form: Literal["auto", "console", "json"] = "auto", **context: str) -> None:
+    """Set the process' log up; `context` (e.g. the process' id) stands in every line."""
+    readable = form == "console" or (form == "auto" and sys.stderr.isatty())
+    last: list[Any] = (
+        [structlog.dev.ConsoleRenderer()]
+        if readable
+        else [structlog.processors.dict_tracebacks, structlog.processors.JSONRenderer()]
+    )
+    structlog.configure(
+        processors=[
+            structlog.contextvars.merge_contextvars,
+            lambda _, __, event: {**context, **event},
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso", utc=True),
+            *last,
+        ],
+        wrapper_class=structlog.make_filtering_bound_logger(logging.INFO),
+        # Looked up at every line: a test runner exchanges the stream behind our back.
+        logger_factory=lambda *_: structlog.PrintLogger(sys.stderr),
+        cache_logger_on_first_use=False,
+    )
+
+
+def logger(name: str) -> Any:
+    """A logger whose lines say which part of the process speaks."""
+    return structlog.get_logger().bind(part=name)
+
+
+def request(endpoint: str, request_id: str, seconds: float, outcome: str) -> None:
+    """The one line of a request."""
+    level = "error" if outcome == "internal" else "info"
+    ms = round(1e3 * seconds, 2)
+    getattr(logger("request"), level)("request", endpoint=endpoint, request=request_id, ms=ms, outcome=outcome)
+
+
+def defect(endpoint: str, request_id: str) -> None:
+    """The traceback of the exception being handled: it never crosses the wire."""
+    logger("request").exception("defect", endpoint=endpoint, request=request_id)
