@@ -28,7 +28,7 @@ def segment(points: np.ndarray, mask: np.ndarray | None, min_height: float) -> n
     if mask is not None:
         garment = measured & mask
     else:
-        garment = np.asarray(binary_opening(measured & (height > min_height), SPECKLE_PX))
+        garment = np.asarray(binary_opening(measured & (height > min_height), SPECKLE_PX), bool)
     if not garment.any():
         where = "inside the mask" if mask is not None else f"more than {min_height * 1e3:.0f} mm above the table"
         raise NoGarment(f"no measured pixel {where}")
