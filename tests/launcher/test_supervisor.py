@@ -15,27 +15,13 @@ import pytest
 from medor_wire import supervisor
 from medor_wire.supervisor import LONGEST_PAUSE_S, Process, Supervisor
 
+from .conftest import eventually, gone
+
 QUIET = "import time; print('up', flush=True); time.sleep(60)"
 STUBBORN = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('up', flush=True); time.sleep(60)"
 PARENT = f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {QUIET!r}]).wait()"
 
 Keep = Callable[..., Supervisor]
-
-
-def eventually(condition: Callable[[], object], seconds: float = 5.0) -> float:
-    """Seconds until `condition` holds."""
-    start = time.monotonic()
-    while not condition():
-        assert time.monotonic() - start < seconds, "it never came true"
-        time.sleep(0.01)
-    return time.monotonic() - start
-
-
-def gone(pid: int) -> bool:
-    try:
-        return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return True
 
 
 @pytest.fixture

@@ -80,7 +80,6 @@ class Launcher:
         given = {**os.environ, **(environment or {})}
         # Keys guard a door that others can reach; this one is on loopback.
         services = compose.read(file, {"MEDOR_GATEWAY__API_KEYS": "", **given})
-        self._hosts_router = ROUTER in services
         self.output = Output(file.parent / logs, echo=echo)
         self._supervisor = Supervisor(
             [
@@ -90,7 +89,7 @@ class Launcher:
             ]
         )
         self.processes = self._supervisor.processes
-        self.bus: Bus | None = None
+        self.bus: Bus
         self._open = ExitStack()
 
     def _process(self, replica: compose.Replica, given: Mapping[str, str], folder: Path) -> Process:
@@ -110,9 +109,8 @@ class Launcher:
         """Starts the router and every process; does not wait for them."""
         with ExitStack() as opened:
             opened.enter_context(self.output)
-            if self._hosts_router:
-                opened.enter_context(routing(self.router))
-                self.bus = opened.enter_context(join("launcher", BusConfig(router=self.router)))
+            opened.enter_context(routing(self.router))
+            self.bus = opened.enter_context(join("launcher", BusConfig(router=self.router)))
             self._supervisor.start()
             opened.callback(self._supervisor.stop)
             self._open = opened.pop_all()
@@ -130,15 +128,12 @@ class Launcher:
 
     def waiting_for(self) -> dict[str, str]:
         """The processes that are not ready, with what is known about each; empty when the cell is ready."""
-        beats = self.bus.health() if self.bus else {}
-        by_id = {name.rpartition("/")[2]: beat for name, beat in beats.items()}
+        beats = {beat.id: beat for beat in self.bus.health().values()}
         found = {}
         for name, process in self.processes.items():
-            beat = by_id.get(name)
+            beat = beats.get(name)
             if not process.alive:
                 found[name] = "restarting" if process.exit_codes else "starting"
-            elif self.bus is None:
-                continue
             elif beat is None or beat.age_s > min(FRESH_S, time.monotonic() - process.started_at):
                 found[name] = "starting"
             elif not beat.ready:
