@@ -79,7 +79,7 @@ class Launcher:
         require_free(int(self.router.rpartition(":")[2]), "--router-port")
         given = {**os.environ, **(environment or {})}
         # Keys guard a door that others can reach; this one is on loopback.
-        services = compose.read(file, {"MEDOR_GATEWAY__API_KEYS": "", **given})
+        services = compose.read(file, {"MEDOR_GATEWAY__KEYS": "", **given})
         self.output = Output(file.parent / logs, echo=echo)
         self._supervisor = Supervisor(
             [
