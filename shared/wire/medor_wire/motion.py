@@ -12,6 +12,7 @@ from medor_wire.messages import ActOutcome, ActRequest
 
 Check = Callable[[], None]
 """Raises when the motion must not go on: emergency stop, lease lost, cancelled."""
+Move = Callable[[ActRequest, Check], ActOutcome]
 
 
 class Motion:
@@ -35,9 +36,7 @@ class Motion:
         """Hold this to change what lies on the table without an action in between."""
         return self._turn
 
-    def act(
-        self, request: ActRequest, call: Call, allow: Callable[[], None], move: Callable[[Check], ActOutcome]
-    ) -> ActOutcome:
+    def act(self, request: ActRequest, call: Call, allow: Callable[[ActRequest], None], move: Move) -> ActOutcome:
         """Carry `request` out with `move`, or say what came of it before.
 
         Refusals before anything moved are not recorded: the same action may be asked again.
@@ -46,7 +45,7 @@ class Motion:
             request: the action.
             call: whose withdrawal stops the motion.
             allow: raises when the action is impossible here, such as `OutOfReach`.
-            move: does it; calls its argument again and again and stops safely when that raises.
+            move: does it; calls its second argument again and again and stops safely when that raises.
 
         Raises:
             EmergencyStopped, LeaseLost: before or during the motion.
@@ -56,10 +55,10 @@ class Motion:
         with self._turn:
             self.lessor.check(request.epoch)
             call.check()
-            allow()
+            allow(request)
             return self._ledger.once(request, lambda: self._move(request, call, move))
 
-    def _move(self, request: ActRequest, call: Call, move: Callable[[Check], ActOutcome]) -> ActOutcome:
+    def _move(self, request: ActRequest, call: Call, move: Move) -> ActOutcome:
         def check() -> None:
             self.lessor.check(request.epoch)
             if call.withdrawn():
@@ -67,7 +66,7 @@ class Motion:
 
         self._moving = True
         try:
-            outcome = move(check)
+            outcome = move(request, check)
             self.actions += 1
             return outcome
         finally:

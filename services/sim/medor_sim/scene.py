@@ -1,0 +1,115 @@
+"""What lies on the simulated table, and its figures. A scene is never changed: every action makes a new one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from medor_cloth.alignment import canonical_cost
+from medor_cloth.camera import Camera
+from medor_cloth.coverage import coverage
+from medor_cloth.improvement import normalized_improvement_canonical, normalized_improvement_flatten
+from medor_cloth.picker import SETTLED_SPEED, pull
+from medor_cloth.raster import visible_vertices
+from medor_cloth.solver import ClothState
+from medor_cloth.start import dropped, picked
+from medor_sim.wardrobe import Piece
+from medor_wire.errors import MedorError
+from medor_wire.messages import ClothMesh, Score, StartState, Truth
+
+SETTLE_FRAMES = 100
+"""Longest time the cloth gets to settle after an executed action, in frames of 0.01 s."""
+SLICE_FRAMES = 5
+"""A stop takes effect within this many frames."""
+MIN_COST_M = 0.001
+"""A start nearer to its goal than this leaves nothing to improve."""
+STATES: tuple[StartState, ...] = ("drop", "flat", "picks")
+
+
+class Pulled(NamedTuple):
+    """What came of a pull."""
+
+    scene: "Scene"
+    grasped: bool
+    stopped: MedorError | None
+    """Why it was cut short."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A garment on the table and where its episode began."""
+
+    piece: Piece
+    cloth: ClothState
+    start_coverage: float
+    """Coverage at the reset [m²]."""
+    start_cost: float
+    """Canonical cost at the reset [m]."""
+    picks: int = 0
+
+    @classmethod
+    def begin(cls, piece: Piece, state: StartState, seed: int) -> "Scene":
+        """A start state; the same garment, state and seed give the same scene."""
+        cloth = start_state(piece, state, seed)
+        area = coverage(cloth.positions, piece.garment.faces)
+        return cls(piece, cloth, area, float(canonical_cost(cloth.positions, piece.goals)))
+
+    def pulled(self, pick: np.ndarray, place: np.ndarray, check: Callable[[], None]) -> "Pulled":
+        """The scene after one pick-and-place of the flying picker.
+
+        The same motion as `medor_cloth.picker.pick_place`, in slices between which `check` may raise to stop it: then
+        the picker opens where it is and the cloth falls.
+        """
+        solver = self.piece.solver
+        now, grasped, stopped = solver.placed(self.cloth, pick), False, None
+        path = pull(pick, place)
+        try:
+            for begin in range(0, len(path), SLICE_FRAMES):
+                check()
+                part = path[begin : begin + SLICE_FRAMES]
+                now = solver.advance(now, len(part), picker_path=part, holding=np.ones(len(part), bool))
+                grasped |= now.held >= 0
+        except MedorError as error:
+            stopped = error
+        now = solver.advance(now, SETTLE_FRAMES, settle_speed=SETTLED_SPEED)
+        return Pulled(replace(self, cloth=now, picks=self.picks + 1), grasped, stopped)
+
+    def score(self) -> Score:
+        """The referee's figures. An improvement is 0 where the start left no room for one."""
+        best = self.piece.flat_coverage
+        now = coverage(self.cloth.positions, self.piece.garment.faces)
+        cost = float(canonical_cost(self.cloth.positions, self.piece.goals))
+        can_spread, can_align = self.start_coverage < best, self.start_cost > MIN_COST_M
+        flatten = normalized_improvement_flatten(now, self.start_coverage, best) if can_spread else 0.0
+        canonical = normalized_improvement_canonical(cost, self.start_cost) if can_align else 0.0
+        return Score(
+            coverage_m2=now,
+            flat_coverage_m2=best,
+            ni_flatten=float(flatten),
+            ni_canonicalize=float(canonical),
+            canonical_cost_m=cost,
+            picks=self.picks,
+        )
+
+    def truth(self, camera: Camera) -> Truth:
+        garment = self.piece.garment
+        mesh = ClothMesh(
+            vertices=self.cloth.positions,
+            faces=garment.faces,
+            category=garment.category,  # pyright: ignore[reportArgumentType]  (a str there, checked by the message)
+            visible=visible_vertices(self.cloth.positions, garment.faces, camera),
+            canonical=garment.vertices,
+            panel_uv=garment.panel_uv,
+        )
+        return Truth(mesh=mesh, garment_id=self.piece.id)
+
+
+def start_state(piece: Piece, state: StartState, seed: int) -> ClothState:
+    """The garment as an episode finds it: dropped, flat, or flat and then disturbed by random picks."""
+    rng = np.random.default_rng([STATES.index(state), seed])
+    if state == "drop":
+        return dropped(piece.solver, piece.flat, rng)
+    if state == "picks":
+        return picked(piece.solver, piece.flat, rng)
+    return piece.flat

@@ -1,0 +1,67 @@
+"""Simulated cell: serves the robot's endpoints and, beside them, what only a simulation can know or do."""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from medor_cloth.camera import overhead
+from medor_sim.scene import Scene
+from medor_sim.simulator import Simulator
+from medor_sim.wardrobe import Wardrobe
+from medor_wire import endpoints
+from medor_wire.bus import Bus, join
+from medor_wire.config import Settings
+from medor_wire.lease import Lessor
+from medor_wire.ledger import Ledger
+from medor_wire.motion import Motion
+
+
+class Config(Settings, section="sim"):
+    engine: Literal["xpbd"] = "xpbd"
+    """Cloth engine."""
+    ledger: Path = Path("runs/sim/ledger.sqlite")
+    """Where actions are written down before they are carried out."""
+    garments: int = 8
+    """Garments kept with their flat state and goals; as many uploaded ones."""
+
+
+def serve(bus: Bus, simulator: Simulator, lessor: Lessor) -> None:
+    """Every endpoint of the simulated cell. Reads have their own workers, so that they answer during an action."""
+    bus.serve(endpoints.CAPTURE, simulator.capture)
+    bus.serve(endpoints.STATUS, simulator.status)
+    bus.serve(endpoints.REACH, simulator.reach)
+    bus.serve(endpoints.LEASE, simulator.lease)
+    bus.serve(endpoints.ACT, simulator.act)
+    bus.serve(endpoints.CLEAR_STOP, simulator.clear_stop)
+    bus.serve(endpoints.RESET, simulator.reset)
+    bus.serve(endpoints.SCORE, simulator.score)
+    bus.serve(endpoints.TRUTH, simulator.truth)
+    bus.serve(endpoints.UPLOAD_GARMENT, simulator.upload_garment)
+    bus.subscribe(endpoints.STOP, simulator.stop)
+    bus.on_presence(lessor.gone)
+
+
+def warm_up() -> None:
+    """Compile what resets, actions and views need, on a garment that never comes onto the table."""
+    scene = Scene.begin(Wardrobe(1).generated("skirt", 0), "flat", 0)
+    after = scene.pulled(scene.cloth.positions[0], np.array([0.0, 0.0, 0.1]), lambda: None).scene
+    after.score()
+    after.truth(overhead())
+
+
+def main(config: Config) -> None:
+    ledger = Ledger(config.ledger)
+    lessor = Lessor(ledger)
+    with join("sim", config.bus) as bus:
+        bus.ready(False, "warming up")
+        simulator = Simulator(Motion(ledger, lessor), Wardrobe(config.garments), bus.publish)
+        serve(bus, simulator, lessor)
+        warm_up()
+        bus.ready()
+        bus.run()
+    ledger.close()
+
+
+if __name__ == "__main__":
+    main(Config.from_command_line())

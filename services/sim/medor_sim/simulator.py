@@ -1,0 +1,187 @@
+"""The simulated cell: answers as a robot does, plus what only a simulation can (reset, score, truth, upload)."""
+
+import logging
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from medor_cloth.errors import ClothError
+from medor_cloth.picker import pull
+from medor_cloth.raster import rasterize
+from medor_sim.reach_map import TOLERANCE_M, ReachMap
+from medor_sim.scene import Scene
+from medor_sim.wardrobe import Wardrobe
+from medor_sim.world import World
+from medor_wire import endpoints
+from medor_wire import messages as m
+from medor_wire.bus import Call
+from medor_wire.endpoints import Topic
+from medor_wire.errors import BadRequest, OutOfReach, Refused
+from medor_wire.motion import Check, Motion
+
+log = logging.getLogger(__name__)
+
+Tell = Callable[[Topic, m.Message], None]
+
+
+def _nobody(topic: Topic, message: m.Message) -> None:
+    """Nobody watches."""
+
+
+class Simulator:
+    """Handlers of `robot/*` and `sim/*`. Reads see the scene before a running action until it has ended.
+
+    Args:
+        motion: gate of everything that moves.
+        wardrobe: where garments come from.
+        tell: called with what observers may watch, after every change.
+    """
+
+    def __init__(self, motion: Motion, wardrobe: Wardrobe | None = None, tell: Tell = _nobody) -> None:
+        self._motion = motion
+        self._wardrobe = wardrobe or Wardrobe()
+        self._tell = tell
+        self._world = World()
+        self._reach_map = ReachMap(self._world.arm)
+        self._scene: Scene | None = None
+        camera = self._world.camera
+        self._camera_info = m.CameraInfo(
+            K=camera.K, T_world_camera=camera.T_world_camera, width=camera.width, height=camera.height
+        )
+
+    # --- the robot's contract -------------------------------------------------------------------------------------
+
+    def capture(self, request: m.Empty, call: Call) -> m.DepthView:
+        """What the camera sees: the cloth only, 0 elsewhere. An empty table is all 0."""
+        camera, scene = self._world.camera, self._scene
+        shape = camera.height, camera.width
+        depth, mask = np.zeros(shape, np.float32), np.zeros(shape, bool)
+        if scene is not None:
+            raster = rasterize(scene.cloth.positions, scene.piece.garment.faces, camera)
+            depth, mask = raster.depth, raster.mask
+        return m.DepthView(depth=depth, mask=mask, camera=self._camera_info, stamp_ns=time.time_ns())
+
+    def status(self, request: m.Empty, call: Call) -> m.CellStatus:
+        lessor, scene = self._motion.lessor, self._scene
+        return m.CellStatus.model_validate(
+            {
+                "cell": "sim",
+                "state": self._motion.state,
+                "category": scene.piece.garment.category if scene else None,
+                "holder": lessor.holder,
+                "epoch": lessor.epoch,
+                "actions": self._motion.actions,
+                "camera": self._camera_info,
+                "detail": lessor.stopped or "",
+            }
+        )
+
+    def reach(self, request: m.ReachRequest, call: Call) -> m.Reach:
+        return m.Reach(reachable=self._reach_map.reachable(request.points))
+
+    def lease(self, request: m.LeaseRequest, call: Call) -> m.Lease:
+        lease = self._motion.lessor.lease(request, call)
+        if request.action != "renew":
+            self._tell_status()
+        return lease
+
+    def act(self, request: m.ActRequest, call: Call) -> m.ActOutcome:
+        """One pick-and-place; the arm follows the flying picker as well as it can.
+
+        Raises:
+            OutOfReach: the pick or the place; nothing has moved.
+            Refused: nothing lies on the table, or what `Motion.act` says.
+        """
+        outcome = self._motion.act(
+            request, call, lambda: self._allow(request), lambda check: self._move(request, check)
+        )
+        self._tell(endpoints.ACTION, outcome)
+        return outcome
+
+    def stop(self, order: m.EmergencyStop) -> None:
+        """Latch the emergency stop."""
+        self._motion.lessor.stop(order)
+        log.warning("emergency stop: %s", self._motion.lessor.stopped)
+        self._tell_status()
+
+    def clear_stop(self, order: m.ClearStop, call: Call) -> m.CellStatus:
+        self._motion.lessor.clear_stop(order)
+        log.warning("emergency stop cleared by %s", order.operator)
+        self._tell_status()
+        return self.status(m.Empty(), call)
+
+    # --- simulation only ------------------------------------------------------------------------------------------
+
+    def reset(self, request: m.ResetRequest, call: Call) -> m.Score:
+        """Lay a garment on the table. The same request gives the same scene.
+
+        Raises:
+            BadRequest: no such garment, or it cannot be brought into this state.
+        """
+        piece = (
+            self._wardrobe.generated(request.category, request.garment_seed)
+            if request.garment_id is None
+            else self._wardrobe.uploaded(request.garment_id)
+        )
+        with self._motion.alone():
+            call.check()
+            try:
+                self._scene = Scene.begin(piece, request.state, request.seed)
+            except ClothError as error:
+                raise BadRequest(f"{piece.id} cannot be brought into the state {request.state!r}: {error}") from error
+        self._tell_scene()
+        return self._require_scene().score()
+
+    def score(self, request: m.Empty, call: Call) -> m.Score:
+        return self._require_scene().score()
+
+    def truth(self, request: m.Empty, call: Call) -> m.Truth:
+        return self._require_scene().truth(self._world.camera)
+
+    def upload_garment(self, request: m.UploadGarment, call: Call) -> m.GarmentId:
+        """Take in a user's mesh, to be laid out by a later reset."""
+        piece = self._wardrobe.add(request.content, request.file_type, request.category)
+        garment = piece.garment
+        return m.GarmentId(garment_id=piece.id, vertices=len(garment.vertices), faces=len(garment.faces))
+
+    def close(self) -> None:
+        self._world.close()
+
+    # ----------------------------------------------------------------------------------------------------------------
+
+    def _require_scene(self) -> Scene:
+        if self._scene is None:
+            raise Refused("nothing lies on the table: reset the cell first")
+        return self._scene
+
+    def _allow(self, request: m.ActRequest) -> None:
+        self._require_scene()
+        ends = {"pick": request.pick, "place": request.place}
+        reachable = self._reach_map.reachable(np.stack(list(ends.values())))
+        for (name, point), within in zip(ends.items(), reachable, strict=True):
+            if not within:
+                raise OutOfReach(f"{name}: the arm cannot bring its tool to {point.round(4).tolist()} m")
+
+    def _move(self, request: m.ActRequest, check: Check) -> m.ActOutcome:
+        start = time.perf_counter()
+        pulled = self._require_scene().pulled(request.pick, request.place, check)
+        short = self._world.arm.follow(pull(request.pick, request.place))
+        self._world.arm.park()
+        self._scene = pulled.scene
+        self._tell_scene()
+        if pulled.stopped is not None:
+            raise pulled.stopped
+        return m.ActOutcome(
+            action_id=request.action_id,
+            grasped=pulled.grasped,
+            arm_reached=short < TOLERANCE_M,
+            seconds=time.perf_counter() - start,
+        )
+
+    def _tell_status(self) -> None:
+        self._tell(endpoints.CELL, self.status(m.Empty(), Call()))
+
+    def _tell_scene(self) -> None:
+        self._tell(endpoints.DEPTH, self.capture(m.Empty(), Call()))
+        self._tell_status()
