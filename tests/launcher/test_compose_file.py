@@ -17,7 +17,7 @@ from medor_wire.config import Settings
 
 FILE = compose.find(Path(__file__).parent)
 ROOT = FILE.parent
-KEYS = {"MEDOR_GATEWAY__API_KEYS": "0123456789abcdef=read"}
+KEYS = {"MEDOR_GATEWAY__KEYS": "0123456789abcdef=read"}
 RAW = yaml.safe_load(FILE.read_text())["services"]
 SERVICES = compose.read(FILE, KEYS)
 
@@ -117,7 +117,7 @@ def test_docker_compose_runs_the_simulated_cell_unless_told() -> None:
 def test_docker_compose_refuses_to_open_the_door_without_keys() -> None:
     done = config(FILE, "config", "--quiet")
     assert done.returncode != 0
-    assert "MEDOR_GATEWAY__API_KEYS" in done.stderr
+    assert "MEDOR_GATEWAY__KEYS" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ def test_services_are_handed_loopback_addresses(tmp_path: Path) -> None:
             environment:
               MEDOR_GATEWAY__HOST: 0.0.0.0
               MEDOR_BUS__ROUTER: tcp/router:7447
-              MEDOR_GATEWAY__API_KEYS: "${MEDOR_GATEWAY__API_KEYS?who may call}"
+              MEDOR_GATEWAY__KEYS: "${MEDOR_GATEWAY__KEYS?who may call}"
     """
     with Launcher(file=write_cell(tmp_path, containers, told), environment={"MEDOR_X": "y"}, echo=False) as cell:
         eventually(lambda: cell.processes["gateway"].tail)
@@ -114,5 +114,5 @@ def test_services_are_handed_loopback_addresses(tmp_path: Path) -> None:
     assert f"http://127.0.0.1:{environment['MEDOR_GATEWAY__PORT']}" == cell.url
     assert environment["MEDOR_BUS__ROUTER"] == cell.router
     assert environment["MEDOR_BUS__ID"] == "gateway"
-    assert environment["MEDOR_GATEWAY__API_KEYS"] == ""
+    assert environment["MEDOR_GATEWAY__KEYS"] == ""
     assert environment["MEDOR_X"] == "y"

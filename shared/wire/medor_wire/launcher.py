@@ -5,10 +5,12 @@ with Launcher(profile="sim") as cell:
     httpx.get(f"{cell.url}/readyz")
 """
 
+import http.client
 import os
 import socket
 import sys
 import time
+import urllib.request
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -138,7 +140,17 @@ class Launcher:
                 found[name] = "starting"
             elif not beat.ready:
                 found[name] = beat.detail or "warming up"
+        if not found and DOOR in self.processes and not self._open_door():
+            found[DOOR] = "looking for the others"
         return found
+
+    def _open_door(self) -> bool:
+        """Whether the gateway answers that all it needs is there."""
+        try:
+            with urllib.request.urlopen(f"{self.url}/readyz", timeout=2) as answer:
+                return answer.status == 200
+        except (OSError, http.client.HTTPException):
+            return False
 
     def wait_ready(self, timeout: float = 60.0) -> float:
         """Blocks until every process says it is ready, showing progress. Returns the seconds waited.

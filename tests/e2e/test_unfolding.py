@@ -1,0 +1,54 @@
+"""The main job on real input: a crumpled garment, its depth image, the chosen pick-and-place, more coverage."""
+
+import httpx
+import pytest
+
+from medor_wire import endpoints
+from medor_wire.launcher import Launcher
+from medor_wire.messages import Empty
+
+GARMENT = {"category": "tshirt", "garment_seed": 800001, "state": "drop", "seed": 1}
+
+
+def plan(door: httpx.Client, method: str, candidates: int = 24) -> dict:
+    """A plan for what lies on the table."""
+    options = {"candidates": candidates, "seed": 3}
+    answer = door.post("/plan", json={"category": GARMENT["category"], "method": method, "options": options})
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def test_everything_is_ready(door: httpx.Client) -> None:
+    answer = door.get("/readyz")
+    assert answer.status_code == 200
+    assert [len(health["instances"]) for health in answer.json()["services"].values()] == [1, 2, 1, 1]
+
+
+def test_foreseeing_with_the_true_mesh_and_acting_once_grows_the_coverage(cell: Launcher, door: httpx.Client) -> None:
+    before = door.post("/cell/reset", json=GARMENT).json()["coverage_m2"]
+    chosen = plan(door, "oracle")
+    predicted = chosen["predicted"]
+    assert predicted["no_op_reward"] == pytest.approx(before, rel=0.05)
+    assert predicted["reward"] > 1.05 * before
+
+    outcome = door.post(f"/plans/{chosen['plan_id']}/execute").json()
+    after = cell.bus.ask(endpoints.SCORE, Empty()).coverage_m2
+    assert outcome["grasped"]
+    assert after == pytest.approx(predicted["reward"], rel=0.1)
+    assert after > before
+
+    again = door.post(f"/plans/{chosen['plan_id']}/execute").json()
+    assert again["replayed"]
+    assert again["action_id"] == outcome["action_id"]
+    assert cell.bus.ask(endpoints.SCORE, Empty()).coverage_m2 == after, "the second call moved the cloth"
+
+
+def test_a_depth_image_alone_is_enough(door: httpx.Client) -> None:
+    door.post("/cell/reset", json=GARMENT).raise_for_status()
+    seen = door.get("/cell/observation", headers={"Accept": "application/json"}).json()
+    options = {"candidates": 24, "seed": 3}
+    given = {"category": "tshirt", "method": "visible", "observation": seen, "options": options}
+    chosen = door.post("/plan", json=given).json()
+    assert chosen["predicted"]["reward"] > chosen["predicted"]["no_op_reward"]
+    assert chosen["action"] == plan(door, "visible")["action"], "the cell's own camera saw something else"
+    assert door.post(f"/plans/{chosen['plan_id']}/execute").json()["grasped"]
