@@ -9,6 +9,8 @@ from medor_cloth.outline import Curve, bezier, fillet, join, line, mirror
 
 SIDE_CLEARANCE = 0.035
 """How far beyond the side seam a sleeve's cuff must lie, human scale [m]."""
+STRAP = 0.045
+"""Least width of a shoulder: about one mesh edge at the robot's scale, human scale [m]."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Bodice:
         kind = rng.choice(3, p=sleeves)
         sleeve = (0.0, rng.uniform(0.06, 0.24), rng.uniform(0.30, 0.52))[kind]
         if kind == 0:
-            shoulder = max(neck + 0.035, shoulder - rng.uniform(0.0, 0.06))
+            shoulder = max(neck + STRAP, shoulder - rng.uniform(0.0, 0.06))
         cuff = np.interp(sleeve, (0.05, 0.55), (armhole * 0.86, 0.11)) * rng.uniform(0.9, 1.3)
         return cls(
             neck=neck,
@@ -81,7 +83,7 @@ class Bodice:
     def _sleeveless(self, below: Curve) -> tuple[Curve, Curve, Curve]:
         along, _ = self._arm_axes()
         neck_point, underarm = np.array([self.neck, 0.0]), np.array([self.chest, -self.armhole])
-        tip = neck_point + along * max(self.shoulder - self.neck, 0.03)
+        tip = neck_point + along * (self.shoulder - self.neck)
         inward = 0.55 * (self.chest - tip[0]) + 0.02
         armhole = bezier(tip, tip - (0, 0.45 * self.armhole), underarm - (inward, 0), underarm, samples=32)
         return line(neck_point, tip), armhole, np.vstack([underarm, below])

@@ -63,11 +63,18 @@ class Legs:
         return join(over_hip, line(hip, self._hem()[1]))
 
     def bottom(self) -> dict[str, Curve]:
-        """The lower edges, counter-clockwise: left hem, inner seam over the crotch, right hem."""
+        """The lower edges, counter-clockwise: left hem, inner seams up to the crotch and down, right hem."""
         inner, outer = self._hem()
-        inseam = fillet(inner * (-1, 1), (0.0, self.top - self.rise), inner, self.crotch_radius)
+        over = fillet(inner * (-1, 1), (0.0, self.top - self.rise), inner, self.crotch_radius)
+        crotch = np.array([0.0, np.interp(0.0, over[:, 0], over[:, 1])])
+        inseam = np.vstack([crotch, over[over[:, 0] > 1e-9]])
         hem = line(inner, outer)
-        return {"hem_left": mirror(hem), "inseam": inseam, "hem_right": hem}
+        return {
+            "hem_left": mirror(hem),
+            "inseam_left": mirror(inseam),
+            "inseam_right": inseam,
+            "hem_right": hem,
+        }
 
     def _hem(self) -> tuple[np.ndarray, np.ndarray]:
         """Inner and outer end of the right hem."""

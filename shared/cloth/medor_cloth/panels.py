@@ -13,6 +13,7 @@ SLIT = 0.009
 """Half width of the gap between the two edges of a front opening, human scale [m]."""
 
 BODICE_SEAMS = ("side_right", "shoulder_right", "shoulder_left", "side_left")
+INSEAMS = ("inseam_left", "inseam_right")
 
 
 def trousers(rng: np.random.Generator) -> Pattern:
@@ -23,7 +24,7 @@ def trousers(rng: np.random.Generator) -> Pattern:
     outline = {**legs.bottom(), **right, "waist": waist, **mirrored(right)}
     return Pattern(
         panels={"front": Panel(outline, front=True), "back": Panel(outline, front=False)},
-        seams=back_to_back("outer_right", "outer_left", "inseam"),
+        seams=back_to_back("outer_right", "outer_left", *INSEAMS),
         boundary_loops=3,
         flatness=rng.uniform(),
     )
@@ -98,7 +99,7 @@ def jumpsuit(rng: np.random.Generator) -> Pattern:
     panels = {
         name: Panel(bodice.outline(name == "front", below, bottom), front=name == "front") for name in ("front", "back")
     }
-    return Pattern(panels, back_to_back(*BODICE_SEAMS, "inseam"), boundary_loops=5, flatness=rng.uniform())
+    return Pattern(panels, back_to_back(*BODICE_SEAMS, *INSEAMS), boundary_loops=5, flatness=rng.uniform())
 
 
 PATTERNS: dict[str, Callable[[np.random.Generator], Pattern]] = {

@@ -63,7 +63,7 @@ def _segments(pattern: Pattern, edge: float) -> dict[EdgeName, int]:
     lengths = {(p, e): length(c) for p, panel in pattern.panels.items() for e, c in panel.edges.items()}
     for seam in pattern.seams:
         lengths[seam.first] = lengths[seam.second] = (lengths[seam.first] + lengths[seam.second]) / 2
-    return {name: max(2, round(size / edge)) for name, size in lengths.items()}
+    return {name: max(1, round(size / edge)) for name, size in lengths.items()}
 
 
 def _sampled_outline(panel: Panel, counts: list[int]) -> tuple[NDArray, dict[str, NDArray]]:
