@@ -93,9 +93,7 @@ class Simulator:
             OutOfReach: the pick or the place; nothing has moved.
             Refused: nothing lies on the table, or what `Motion.act` says.
         """
-        outcome = self._motion.act(
-            request, call, lambda: self._allow(request), lambda check: self._move(request, check)
-        )
+        outcome = self._motion.act(request, call, allow=self._allow, move=self._move)
         self._tell(endpoints.ACTION, outcome)
         return outcome
 
