@@ -1,14 +1,48 @@
-"""Sheets of cloth under the overhead camera, and a cell with a real solver but without a robot."""
+"""Sheets of cloth under the overhead camera, and a whole cell on one in-process bus, with a solver for a robot."""
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
+from medor_cloth.alignment import canonical_cost
 from medor_cloth.camera import Camera, overhead
+from medor_cloth.coverage import coverage
+from medor_cloth.garment import Garment, generate
+from medor_cloth.goals import flattened, goal_set, solver_of
+from medor_cloth.picker import pick_place
 from medor_cloth.raster import rasterize, visible_vertices
+from medor_cloth.solver import ClothState
+from medor_dynamics.flatten import Flattener
+from medor_dynamics.physics import Physics
+from medor_dynamics.roller import Roller
+from medor_planner.episode import Episodes
+from medor_planner.executor import Executor
+from medor_planner.planner import Planner
+from medor_planner.plans import Plans
 from medor_planner.sampling import Scene
-from medor_wire.messages import CameraInfo, ClothMesh, DepthView
+from medor_recon.reconstructor import Reconstructor
+from medor_wire import endpoints
+from medor_wire.bus import Call
+from medor_wire.errors import LeaseHeld, LeaseLost
+from medor_wire.local_bus import LocalBus
+from medor_wire.messages import (
+    ActOutcome,
+    ActRequest,
+    CameraInfo,
+    ClothMesh,
+    DepthView,
+    Empty,
+    Lease,
+    LeaseRequest,
+    Reach,
+    ReachRequest,
+    ResetRequest,
+    Score,
+    Truth,
+)
 
 
 @pytest.fixture
@@ -23,7 +57,11 @@ def sheet_scene(camera: Camera) -> Callable[..., Scene]:
         if folded:
             over = vertices[:, 0] > 0.034
             vertices[over] = vertices[over] * [-1, 1, 1] + [0.068, 0, 0.006]
-        return seen((vertices + [*centre, 0]).astype(np.float32), faces, camera)
+        vertices = (vertices + [*centre, 0]).astype(np.float32)
+        mesh = ClothMesh(
+            vertices=vertices, faces=faces, category="tshirt", visible=visible_vertices(vertices, faces, camera)
+        )
+        return Scene(mesh, view_of(vertices, faces, camera))
 
     return make
 
@@ -38,14 +76,176 @@ def sheet(width: float, length: float, edge: float = 0.02) -> tuple[np.ndarray, 
     return np.stack([x, y, np.full_like(x, 0.005)], -1).reshape(-1, 3), faces
 
 
-def seen(vertices: np.ndarray, faces: np.ndarray, camera: Camera) -> Scene:
-    """A mesh and its depth image."""
-    mesh = ClothMesh(
-        vertices=vertices, faces=faces, category="tshirt", visible=visible_vertices(vertices, faces, camera)
-    )
-    return Scene(mesh, view_of(vertices, faces, camera))
-
-
 def view_of(vertices: np.ndarray, faces: np.ndarray, camera: Camera) -> DepthView:
     info = CameraInfo(K=camera.K, T_world_camera=camera.T_world_camera, width=camera.width, height=camera.height)
     return DepthView(depth=rasterize(vertices, faces, camera).depth, camera=info)
+
+
+@dataclass
+class Cell:
+    """A robot cell without a robot: the solver moves the garment, everything is in reach."""
+
+    garment: Garment
+    camera: Camera
+    state: ClothState = field(init=False)
+    acts: list[ActRequest] = field(default_factory=list)
+    leases: list[LeaseRequest] = field(default_factory=list)
+    holder: str | None = None
+    epoch: int = 0
+    in_reach: Callable[[np.ndarray], np.ndarray] = field(default=lambda points: np.ones(len(points), bool))
+
+    def __post_init__(self) -> None:
+        self.solver = solver_of(self.garment)
+        self.flat = flattened(self.garment, self.solver)
+        self.goals = goal_set(self.garment, self.solver)
+        self.lay(self.flat)
+
+    @property
+    def positions(self) -> np.ndarray:
+        return self.state.positions
+
+    def lay(self, state: ClothState) -> None:
+        """Start anew from `state`."""
+        self.state = self.solver.rest(state.positions)
+        self.outcomes: dict[str, ActOutcome] = {}
+        self.start = self._measure()
+
+    def fold_corner(self) -> None:
+        """Fold a sleeve or a leg over: a garment that one pull can improve."""
+        outermost = self.flat.positions[self.flat.positions[:, :2].sum(axis=1).argmin()]
+        pick = outermost + np.array([0, 0, 0.01], np.float32)
+        middle = np.array([0.02, 0.02, 0.06], np.float32)
+        self.lay(pick_place(self.solver, self.flat, pick, middle, settle_frames=100).state)
+
+    def capture(self, _: Empty, call: Call) -> DepthView:
+        return view_of(self.positions, self.garment.faces, self.camera)
+
+    def reach(self, request: ReachRequest, call: Call) -> Reach:
+        return Reach(reachable=self.in_reach(request.points))
+
+    def lease(self, request: LeaseRequest, call: Call) -> Lease:
+        self.leases.append(request)
+        if request.action == "acquire":
+            if self.holder not in (None, request.holder):
+                raise LeaseHeld(f"{self.holder} holds the robot")
+            self.holder, self.epoch = request.holder, self.epoch + 1
+        elif request.epoch != self.epoch:
+            raise LeaseLost("another epoch")
+        elif request.action == "release":
+            self.holder = None
+        return Lease(epoch=self.epoch, ttl_s=0.4)
+
+    def act(self, request: ActRequest, call: Call) -> ActOutcome:
+        if request.action_id in self.outcomes:
+            return self.outcomes[request.action_id].model_copy(update={"replayed": True})
+        if request.epoch != self.epoch or self.holder is None:
+            raise LeaseLost("another epoch")
+        self.acts.append(request)
+        outcome = pick_place(self.solver, self.state, request.pick, request.place, settle_frames=100)
+        self.state = self.solver.rest(outcome.state.positions)
+        self.outcomes[request.action_id] = ActOutcome(action_id=request.action_id, grasped=outcome.grasped)
+        return self.outcomes[request.action_id]
+
+    def reset(self, request: ResetRequest, call: Call) -> Score:
+        self.lay(self.flat)
+        self.fold_corner()
+        return self.score(Empty(), call)
+
+    def score(self, _: Empty, call: Call) -> Score:
+        covered, cost = self._measure()
+        covered_start, cost_start = self.start
+        flat = coverage(self.flat.positions, self.garment.faces)
+        return Score(
+            coverage_m2=covered,
+            flat_coverage_m2=flat,
+            ni_flatten=(covered - covered_start) / max(flat - covered_start, 1e-9),
+            ni_canonicalize=1 - cost / max(cost_start, 1e-9),
+            canonical_cost_m=cost,
+            picks=len(self.outcomes),
+        )
+
+    def truth(self, _: Empty, call: Call) -> Truth:
+        mesh = ClothMesh(
+            vertices=self.positions,
+            faces=self.garment.faces,
+            category="tshirt",
+            visible=visible_vertices(self.positions, self.garment.faces, self.camera),
+            canonical=self.garment.vertices,
+            panel_uv=self.garment.panel_uv,
+        )
+        return Truth(mesh=mesh, garment_id="test")
+
+    def serve(self, bus: LocalBus, *, referee: bool = True) -> None:
+        bus.serve(endpoints.CAPTURE, self.capture)
+        bus.serve(endpoints.REACH, self.reach)
+        bus.serve(endpoints.LEASE, self.lease)
+        bus.serve(endpoints.ACT, self.act)
+        if referee:
+            bus.serve(endpoints.RESET, self.reset)
+            bus.serve(endpoints.SCORE, self.score)
+            bus.serve(endpoints.TRUTH, self.truth)
+
+    def _measure(self) -> tuple[float, float]:
+        return coverage(self.positions, self.garment.faces), float(canonical_cost(self.positions, self.goals))
+
+
+@pytest.fixture(scope="session")
+def tshirt() -> Garment:
+    return generate("tshirt", 800_001, edge_m=0.025)
+
+
+@pytest.fixture
+def cell(tshirt: Garment, camera: Camera) -> Cell:
+    cell = Cell(tshirt, camera)
+    cell.fold_corner()
+    return cell
+
+
+class Lab:
+    """Every service on one in-process bus."""
+
+    def __init__(self, cell: Cell, *, referee: bool = True) -> None:
+        self.cell = cell
+        self.bus = LocalBus("asker")
+        self.members: dict[str, LocalBus] = {}
+        cell.serve(self.join("robot-1"), referee=referee)
+        self.join("recon-1").serve(endpoints.RECONSTRUCT, Reconstructor().reconstruct)
+        self.add_dynamics("dynamics-1")
+        bus = self.join("planner-1")
+        plans = Plans(4)
+        planner = Planner(bus, plans, chunk=4)
+        executor = Executor(bus, plans)
+        bus.serve(endpoints.PLAN, planner.plan)
+        bus.serve(endpoints.EXECUTE, executor.execute)
+        bus.serve(endpoints.EPISODE, Episodes(bus, planner, executor).run, queue=0)
+
+    def join(self, id: str) -> LocalBus:
+        self.members[id] = self.bus.connect(id)
+        return self.members[id]
+
+    def add_dynamics(self, id: str) -> None:
+        member = self.join(id)
+        member.serve(endpoints.ROLLOUT, Roller({"physics": Physics(threads=1)}).roll_out)
+        member.serve(endpoints.FLATTEN, Flattener().flatten)
+
+    def close(self) -> None:
+        closing = [threading.Thread(target=member.close) for member in (self.bus, *self.members.values())]
+        for thread in closing:
+            thread.start()
+        for thread in closing:
+            thread.join()
+
+
+@pytest.fixture
+def lab(cell: Cell) -> Iterator[Lab]:
+    lab = Lab(cell)
+    yield lab
+    lab.close()
+
+
+@pytest.fixture
+def real_lab(cell: Cell) -> Iterator[Lab]:
+    """Without a referee, like a cell that is not simulated."""
+    lab = Lab(cell, referee=False)
+    yield lab
+    lab.close()

@@ -38,8 +38,7 @@ class Episodes:
             Unavailable: there is no referee (`sim/score`), or another service does not answer.
         """
         check(request)
-        if not self._bus.instances(endpoints.SCORE.service):
-            raise Unavailable("episodes need a referee: no service answers sim/score in this cell")
+        self._find_referee()
         with self._executor.hold() as hand:
             score = self._bus.ask(endpoints.RESET, request.reset) if request.reset else self._score()
             picks = [EpisodePick(index=0, coverage_m2=score.coverage_m2, ni=improvement(score, request.task))]
@@ -95,6 +94,14 @@ class Episodes:
             view=view,
             plan=plan,
         )
+
+    def _find_referee(self) -> None:
+        if self._bus.instances(endpoints.SCORE.service):
+            return
+        try:
+            self._score()
+        except Unavailable as nobody:
+            raise Unavailable("episodes need a referee, and no service of this cell answers sim/score") from nobody
 
     def _score(self) -> Score:
         return self._bus.ask(endpoints.SCORE, Empty())

@@ -26,7 +26,7 @@ FAILURES = 3
 """An instance that fails so often in a row is not asked again in this plan; one that is only busy is."""
 PAUSE_S = 0.2
 """Wait after a failure."""
-GRACE_S = 3.0
+GRACE_S = 1.0
 """How long a plan waits for a dynamics instance to come (back) once none is left."""
 
 
