@@ -12,6 +12,7 @@ from medor_cloth.layout import lay_flat
 from medor_cloth.panels import PATTERNS
 from medor_cloth.sewing import Sewn, sew
 from medor_cloth.topology import topology
+from medor_cloth.triangles import smallest_angle_deg
 
 CATEGORIES = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
 
@@ -106,11 +107,3 @@ def _flaw(garment: Garment, sewn: Sewn, loops: int) -> str:
     if self_intersections(garment.vertices, garment.faces):
         return "self-intersection"
     return ""
-
-
-def smallest_angle_deg(corners: NDArray) -> float:
-    """The smallest angle of all triangles (F, 3, D) [degrees]."""
-    to_next, to_last = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    sizes = np.linalg.norm(to_next, axis=2) * np.linalg.norm(to_last, axis=2)
-    cosine = (to_next * to_last).sum(axis=2) / np.maximum(sizes, 1e-30)
-    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).min())
