@@ -1,5 +1,7 @@
 """What every route shares: the bus, who may enter, and what is remembered."""
 
+from collections.abc import Callable
+from threading import Event
 from typing import Annotated
 
 from fastapi import Depends, Request
@@ -14,6 +16,7 @@ from medor_wire.bus import Bus
 from medor_wire.endpoints import Endpoint
 from medor_wire.endpoints import Reply as ReplyType
 from medor_wire.endpoints import Request as RequestType
+from medor_wire.messages import Message
 
 
 class Door:
@@ -29,9 +32,16 @@ class Door:
         self.meshes = Shelf(config.meshes_kept)
         self.streams = 0
 
-    def ask(self, endpoint: Endpoint[RequestType, ReplyType], request: RequestType) -> ReplyType:
+    def ask(
+        self,
+        endpoint: Endpoint[RequestType, ReplyType],
+        request: RequestType,
+        on_progress: Callable[[Message], None] | None = None,
+        cancel: Event | None = None,
+    ) -> ReplyType:
         """Ask over the bus under the HTTP request's id."""
-        return self.bus.ask(endpoint, request, request_id=current_request_id.get() or None)
+        request_id = current_request_id.get() or None
+        return self.bus.ask(endpoint, request, on_progress=on_progress, cancel=cancel, request_id=request_id)
 
     def close(self) -> None:
         """Cancel what runs."""

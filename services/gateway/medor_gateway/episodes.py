@@ -12,7 +12,6 @@ from medor_gateway.http_models import EpisodeCommand, EpisodeList, EpisodeState,
 from medor_gateway.jobs import Job
 from medor_gateway.problem import documented
 from medor_gateway.records import EpisodeRecord, Step, episode_state
-from medor_gateway.tracing import current_request_id
 from medor_wire import endpoints
 from medor_wire.errors import Busy
 from medor_wire.messages import EpisodePick, EpisodeProgress, EpisodeRequest, Message, PlanProgress
@@ -92,8 +91,6 @@ async def _stream(door: Door, job: Job[EpisodeRecord], after: int) -> AsyncItera
 
 
 def _start(door: Door, request: EpisodeRequest) -> Job[EpisodeRecord]:
-    request_id = current_request_id.get() or None
-
     def work(job: Job[EpisodeRecord]) -> None:
         def note(message: Message) -> None:
             assert isinstance(message, EpisodeProgress)
@@ -103,7 +100,7 @@ def _start(door: Door, request: EpisodeRequest) -> Job[EpisodeRecord]:
                 _note_step(door, job, message.step)
 
         record = job.record
-        episode = door.bus.ask(endpoints.EPISODE, request, on_progress=note, cancel=job.cancel, request_id=request_id)
+        episode = door.ask(endpoints.EPISODE, request, note, job.cancel)
         record.ni, record.reason, record.flat_coverage_m2 = episode.ni, episode.reason, episode.flat_coverage_m2
 
     return door.episodes.start(EpisodeRecord(request), work)

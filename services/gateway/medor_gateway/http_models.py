@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat
 
-from medor_gateway.jobs import Job, Status
-from medor_gateway.media import PNG_UNIT_M, decode_depth, decode_mask, encode_depth, encode_mask
-from medor_gateway.problem import Problem, problem_of
+from medor_cloth.picture import PNG_UNIT_M
+from medor_gateway.jobs import Status
+from medor_gateway.media import decode_depth, decode_mask, encode_depth, encode_mask
+from medor_gateway.problem import Problem
 from medor_wire.messages import (
     ActOutcome,
     CameraInfo,
@@ -40,6 +41,7 @@ def _unicode(text: str) -> str:
 Text = Annotated[str, AfterValidator(_unicode)]
 Seed = Annotated[int, Field(ge=0, lt=2**31, description="The same seed gives the same result.")]
 MethodName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,63}$", description="A named planner preset.")]
+EndReason = Literal["solved", "max_picks", "no_op"]
 Point = tuple[float, float, float]
 Row3 = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat], Field(strict=False)]
 Row4 = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat], Field(strict=False)]
@@ -395,7 +397,7 @@ class EpisodeState(HttpModel):
     max_picks: int
     progress: Progress | None = Field(description="Where the running pick stands.")
     ni: float | None = Field(description="Of the last step; null before the first.")
-    reason: Literal["solved", "max_picks", "no_op"] | None = Field(description="Why it ended, once done.")
+    reason: EndReason | None = Field(description="Why it ended, once done.")
     flat_coverage_m2: float | None
     picks: list[PickReport]
     error: Problem | None
@@ -403,11 +405,6 @@ class EpisodeState(HttpModel):
 
 class EpisodeList(HttpModel):
     episodes: list[EpisodeState] = Field(description="Newest first.")
-
-
-def error_of(job: Job[Any]) -> Problem | None:
-    """Why a job did not get done."""
-    return problem_of(job.error) if job.error else None
 
 
 # --- health ---------------------------------------------------------------------------------------------------

@@ -1,13 +1,16 @@
 """Work that outlives its HTTP request: one thread per job, an event log to follow, cancel, bounded memory."""
 
 import asyncio
+import contextvars
 import threading
 import uuid
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Generic, Literal, TypeVar
 
+from medor_gateway.problem import Problem, problem_of
 from medor_wire import logs
 from medor_wire.errors import Busy, Cancelled, InternalError, MedorError, NotFound
 
@@ -34,6 +37,8 @@ class Job(Generic[Record]):
         """Every id under which the job may be found."""
         self.status: Status = "running"
         self.error: MedorError | None = None
+        self.problem: Problem | None = None
+        """The same, to show; it names the request that began the job."""
         self.cancel = threading.Event()
         """Set by whoever wants the work to stop."""
         self.ended = threading.Event()
@@ -89,8 +94,9 @@ class Job(Generic[Record]):
             self._end("done", None)
 
     def _end(self, status: Status, error: MedorError | None) -> None:
-        data = {"status": status, "code": error.code if error else None, "detail": str(error) if error else None}
+        data = {"status": status, "code": error and error.code, "detail": error and str(error)}
         with self._lock:
+            self.problem = error and problem_of(error)
             self._events.append(Event(len(self._events) + 1, "end", data))
             self.status, self.error = status, error
         self.ended.set()
@@ -124,7 +130,8 @@ class Jobs(Generic[Record]):
             for old in ended[: max(0, len(ended) - self._kept + 1)]:
                 del self._jobs[old.id]
             self._jobs[job.id] = job
-        threading.Thread(target=job.run, args=(work,), name=f"job-{job.id}", daemon=True).start()
+        run = partial(contextvars.copy_context().run, job.run, work)  # still on behalf of the request
+        threading.Thread(target=run, name=f"job-{job.id}", daemon=True).start()
         return job
 
     def find(self, name: str) -> Job[Record]:

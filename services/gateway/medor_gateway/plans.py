@@ -10,7 +10,6 @@ from medor_gateway.http_models import OutcomeReport, PlanCommand, PlanResult, Pl
 from medor_gateway.jobs import Job
 from medor_gateway.problem import ASKS, documented
 from medor_gateway.records import PlanRecord, plan_state
-from medor_gateway.tracing import current_request_id
 from medor_wire import endpoints
 from medor_wire.errors import NotFound, Refused
 from medor_wire.messages import ExecuteRequest, Message, PlanProgress, PlanRequest
@@ -71,14 +70,12 @@ def _planner_id(door: Door, plan_id: str) -> str:
 
 
 def _start(door: Door, request: PlanRequest) -> Job[PlanRecord]:
-    request_id = current_request_id.get() or None
-
     def work(job: Job[PlanRecord]) -> None:
         def note(message: Message) -> None:
             assert isinstance(message, PlanProgress)
             job.record.progress = Progress(stage=message.stage, fraction=message.fraction)
 
-        plan = door.bus.ask(endpoints.PLAN, request, on_progress=note, cancel=job.cancel, request_id=request_id)
+        plan = door.ask(endpoints.PLAN, request, note, job.cancel)
         job.names.add(job.record.finish(plan, door.meshes).plan_id)
 
     return door.plans.start(PlanRecord(), work)

@@ -9,6 +9,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+from starlette.routing import Match
 
 from medor_gateway.tracing import current_request_id
 from medor_wire import errors, logs
@@ -135,7 +136,15 @@ def _http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     code = CODES.get(error.status_code) or HTTPStatus(error.status_code).phrase.lower().replace(" ", "_")
     headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(_allowed(request))
     return respond(problem(error.status_code, code, str(error.detail)), headers)
+
+
+def _allowed(request: Request) -> list[str]:
+    """Methods that some route takes at this path. Starlette names those of the first route only."""
+    scopes = ({**request.scope, "method": method} for method in ("DELETE", "GET", "POST"))
+    return [s["method"] for s in scopes if any(r.matches(s)[0] is Match.FULL for r in request.app.routes)]
 
 
 def _unexpected(request: Request, error: Exception) -> Response:

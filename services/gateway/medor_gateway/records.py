@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from threading import Lock
 
 from medor_gateway.http_models import (
+    EndReason,
     EpisodeState,
     Observation,
     PickDetail,
@@ -12,7 +13,6 @@ from medor_gateway.http_models import (
     PlanResult,
     PlanState,
     Progress,
-    error_of,
 )
 from medor_gateway.jobs import Job
 from medor_wire.errors import NotFound
@@ -92,7 +92,7 @@ class EpisodeRecord:
     progress: Progress | None = None
     ni: float | None = None
     flat_coverage_m2: float | None = None
-    reason: str | None = None
+    reason: EndReason | None = None
 
     def step(self, index: int) -> Step:
         """The step with this index.
@@ -109,7 +109,7 @@ class EpisodeRecord:
 def plan_state(job: Job[PlanRecord]) -> PlanState:
     """A plan's job as JSON."""
     record = job.record
-    return PlanState(id=job.id, status=job.status, progress=record.progress, plan=record.plan, error=error_of(job))
+    return PlanState(id=job.id, status=job.status, progress=record.progress, plan=record.plan, error=job.problem)
 
 
 def episode_state(job: Job[EpisodeRecord]) -> EpisodeState:
@@ -127,5 +127,5 @@ def episode_state(job: Job[EpisodeRecord]) -> EpisodeState:
         reason=record.reason,
         flat_coverage_m2=record.flat_coverage_m2,
         picks=[step.report for step in record.steps],
-        error=error_of(job),
+        error=job.problem,
     )
