@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,7 +27,8 @@ from medor_planner.sampling import Scene
 from medor_recon.reconstructor import Reconstructor
 from medor_wire import endpoints
 from medor_wire.bus import Call
-from medor_wire.errors import LeaseHeld, LeaseLost
+from medor_wire.lease import Lessor
+from medor_wire.ledger import Ledger
 from medor_wire.local_bus import LocalBus
 from medor_wire.messages import (
     ActOutcome,
@@ -43,6 +45,7 @@ from medor_wire.messages import (
     Score,
     Truth,
 )
+from medor_wire.motion import Check, Motion
 
 
 @pytest.fixture
@@ -88,13 +91,15 @@ class Cell:
     garment: Garment
     camera: Camera
     state: ClothState = field(init=False)
-    acts: list[ActRequest] = field(default_factory=list)
-    leases: list[LeaseRequest] = field(default_factory=list)
-    holder: str | None = None
-    epoch: int = 0
+    ledger: Ledger
+    acts: list[str] = field(default_factory=list)
+    """Ids of the actions that moved something."""
+    leases: list[str] = field(default_factory=list)
     in_reach: Callable[[np.ndarray], np.ndarray] = field(default=lambda points: np.ones(len(points), bool))
 
     def __post_init__(self) -> None:
+        self.lessor = Lessor(self.ledger)
+        self.motion = Motion(self.ledger, self.lessor)
         self.solver = solver_of(self.garment)
         self.flat = flattened(self.garment, self.solver)
         self.goals = goal_set(self.garment, self.solver)
@@ -107,7 +112,6 @@ class Cell:
     def lay(self, state: ClothState) -> None:
         """Start anew from `state`."""
         self.state = self.solver.rest(state.positions)
-        self.outcomes: dict[str, ActOutcome] = {}
         self.start = self._measure()
 
     def fold_corner(self) -> None:
@@ -124,27 +128,17 @@ class Cell:
         return Reach(reachable=self.in_reach(request.points))
 
     def lease(self, request: LeaseRequest, call: Call) -> Lease:
-        self.leases.append(request)
-        if request.action == "acquire":
-            if self.holder not in (None, request.holder):
-                raise LeaseHeld(f"{self.holder} holds the robot")
-            self.holder, self.epoch = request.holder, self.epoch + 1
-        elif request.epoch != self.epoch:
-            raise LeaseLost("another epoch")
-        elif request.action == "release":
-            self.holder = None
-        return Lease(epoch=self.epoch, ttl_s=0.4)
+        self.leases.append(request.action)
+        return self.lessor.lease(request, call)
 
     def act(self, request: ActRequest, call: Call) -> ActOutcome:
-        if request.action_id in self.outcomes:
-            return self.outcomes[request.action_id].model_copy(update={"replayed": True})
-        if request.epoch != self.epoch or self.holder is None:
-            raise LeaseLost("another epoch")
-        self.acts.append(request)
+        return self.motion.act(request, call, allow=lambda _: None, move=self._move)
+
+    def _move(self, request: ActRequest, check: Check) -> ActOutcome:
+        self.acts.append(request.action_id)
         outcome = pick_place(self.solver, self.state, request.pick, request.place, settle_frames=100)
         self.state = self.solver.rest(outcome.state.positions)
-        self.outcomes[request.action_id] = ActOutcome(action_id=request.action_id, grasped=outcome.grasped)
-        return self.outcomes[request.action_id]
+        return ActOutcome(action_id=request.action_id, grasped=outcome.grasped)
 
     def reset(self, request: ResetRequest, call: Call) -> Score:
         self.lay(self.flat)
@@ -161,7 +155,7 @@ class Cell:
             ni_flatten=(covered - covered_start) / max(flat - covered_start, 1e-9),
             ni_canonicalize=1 - cost / max(cost_start, 1e-9),
             canonical_cost_m=cost,
-            picks=len(self.outcomes),
+            picks=len(self.acts),
         )
 
     def truth(self, _: Empty, call: Call) -> Truth:
@@ -180,6 +174,7 @@ class Cell:
         bus.serve(endpoints.REACH, self.reach)
         bus.serve(endpoints.LEASE, self.lease)
         bus.serve(endpoints.ACT, self.act)
+        bus.on_presence(self.lessor.gone)
         if referee:
             bus.serve(endpoints.RESET, self.reset)
             bus.serve(endpoints.SCORE, self.score)
@@ -195,10 +190,11 @@ def tshirt() -> Garment:
 
 
 @pytest.fixture
-def cell(tshirt: Garment, camera: Camera) -> Cell:
-    cell = Cell(tshirt, camera)
+def cell(tshirt: Garment, camera: Camera, tmp_path: Path) -> Iterator[Cell]:
+    cell = Cell(tshirt, camera, Ledger(tmp_path / "ledger.sqlite"))
     cell.fold_corner()
-    return cell
+    yield cell
+    cell.ledger.close()
 
 
 class Lab:

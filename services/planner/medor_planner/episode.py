@@ -2,12 +2,13 @@
 
 import time
 
-from medor_planner.executor import Executor, Hand
+from medor_planner.executor import Executor, act
 from medor_planner.methods import method_named
 from medor_planner.planner import Planner
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Call
 from medor_wire.errors import BadRequest, Unavailable
+from medor_wire.holding import Holding
 from medor_wire.messages import (
     Empty,
     Episode,
@@ -39,12 +40,12 @@ class Episodes:
         """
         check(request)
         self._find_referee()
-        with self._executor.hold() as hand:
+        with self._executor.hold() as robot:
             score = self._bus.ask(endpoints.RESET, request.reset) if request.reset else self._score()
             picks = [EpisodePick(index=0, coverage_m2=score.coverage_m2, ni=improvement(score, request.task))]
             call.progress(EpisodeProgress(step=picks[0]))
             while picks[-1].ni <= request.stop_ni and len(picks) <= request.max_picks:
-                pick = self._pick(request, len(picks), hand, call)
+                pick = self._pick(request, len(picks), robot, call)
                 call.progress(EpisodeProgress(step=pick))
                 picks.append(pick.model_copy(update={"view": None, "plan": None}))
         return Episode(
@@ -54,9 +55,10 @@ class Episodes:
             reason="solved" if picks[-1].ni > request.stop_ni else "max_picks",
         )
 
-    def _pick(self, request: EpisodeRequest, index: int, hand: Hand, call: Call) -> EpisodePick:
+    def _pick(self, request: EpisodeRequest, index: int, robot: Holding, call: Call) -> EpisodePick:
         """Look, plan, act and score once."""
         call.check()
+        robot.check()
         started = time.perf_counter()
         view = self._bus.ask(endpoints.CAPTURE, Empty())
         captured = time.perf_counter()
@@ -73,7 +75,7 @@ class Episodes:
         )
         call.check()
         planned = time.perf_counter()
-        hand.act(plan)
+        act(robot, plan)
         acted = time.perf_counter()
         score = self._score()
         return EpisodePick(

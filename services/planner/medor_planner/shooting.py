@@ -5,6 +5,7 @@ takes the next chunk when it has answered the last one. A chunk whose instance i
 """
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -27,7 +28,7 @@ FAILURES = 3
 PAUSE_S = 0.2
 """Wait after a failure."""
 GRACE_S = 1.0
-"""How long a plan waits for a dynamics instance to come (back) once none is left."""
+"""How long a plan waits for a dynamics instance to come back once it has lost the last one."""
 
 
 class Shooting:
@@ -67,7 +68,7 @@ class Shooting:
         return np.concatenate([self._rewards[i] for i in range(len(self._chunks))])
 
     def _watch(self, workers: dict[Instance, threading.Thread], on_fraction: Callable[[float], None]) -> None:
-        last_worked = time.monotonic()
+        last_worked = -math.inf
         reported = -1
         while not self._finished:
             self._hire(workers)
@@ -105,15 +106,13 @@ class Shooting:
             try:
                 self._finish(index, self._ask(instance, index))
                 failures = 0
-            except Unavailable as lost:
+            except (Unavailable, Cancelled) as lost:  # a process that leaves cancels what it runs
                 log.warning("chunk %d of %d goes back: %s: %s", index, len(self._chunks), instance.id, lost)
                 failures += not isinstance(lost, Busy)
                 self._give_back(index)
                 if instance not in self._bus.instances(instance.service):
                     return
                 self._stop.wait(PAUSE_S)
-            except Cancelled:
-                self._give_back(index)
             except MedorError as error:
                 self._fail(error)
             except Exception as defect:
