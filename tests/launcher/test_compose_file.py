@@ -19,7 +19,9 @@ FILE = compose.find(Path(__file__).parent)
 ROOT = FILE.parent
 KEYS = {"MEDOR_GATEWAY__KEYS": "0123456789abcdef=read"}
 RAW = yaml.safe_load(FILE.read_text())["services"]
-SERVICES = compose.read(FILE, KEYS)
+SERVICES = compose.read(FILE, {})
+INSIDE = {name: service.get("environment", {}) for name, service in compose.interpolate(RAW, KEYS).items()}
+"""What each container's environment says, the part for containers only included."""
 
 
 def docker_compose() -> list[str]:
@@ -45,26 +47,32 @@ def test_every_entry_point_exists_and_knows_its_settings(name: str) -> None:
     entry = importlib.import_module(module)
     assert callable(entry.main)
     assert issubclass(entry.Config, Settings)
-    settings = entry.Config.from_environment(SERVICES[name].environment)
+    settings = entry.Config.from_environment(INSIDE[name])
     own = f"MEDOR_{settings.section.upper()}__"
-    assert all(variable.startswith((own, "MEDOR_BUS__")) for variable in SERVICES[name].environment)
+    assert all(variable.startswith((own, "MEDOR_BUS__")) for variable in INSIDE[name])
+
+
+def test_the_launcher_leaves_out_what_is_true_in_containers_only() -> None:
+    left_out = {variable for name in INSIDE for variable in INSIDE[name].keys() - SERVICES[name].environment.keys()}
+    assert {"MEDOR_BUS__ROUTER", "MEDOR_GATEWAY__HOST", "MEDOR_GATEWAY__KEYS"} <= left_out
+    assert not any(variable.startswith(("MEDOR_DYNAMICS__", "MEDOR_SIM__")) for variable in left_out)
 
 
 def test_services_connect_to_where_the_router_listens() -> None:
-    listens = SERVICES["router"].environment["MEDOR_ROUTER__LISTEN"]
+    listens = INSIDE["router"]["MEDOR_ROUTER__LISTEN"]
     port = listens.rpartition(":")[2]
-    addresses = {service.environment["MEDOR_BUS__ROUTER"] for service in SERVICES.values()}
+    addresses = {environment["MEDOR_BUS__ROUTER"] for environment in INSIDE.values()}
     assert addresses == {f"tcp/router:{port}"}
 
 
 def test_the_published_port_is_the_gateways_and_on_loopback_only() -> None:
     published = [port for service in SERVICES.values() for port in service.ports]
-    assert published == [f"127.0.0.1:8080:{SERVICES['gateway'].environment['MEDOR_GATEWAY__PORT']}"]
+    assert published == [f"127.0.0.1:8080:{INSIDE['gateway']['MEDOR_GATEWAY__PORT']}"]
 
 
 def test_replicas_know_how_many_they_are() -> None:
     for given in ({}, {"MEDOR_DYNAMICS__REPLICAS": "3"}):
-        dynamics = compose.read(FILE, {**KEYS, **given})["dynamics"]
+        dynamics = compose.read(FILE, given)["dynamics"]
         assert dynamics.environment["MEDOR_DYNAMICS__REPLICAS"] == str(dynamics.deploy.replicas)
 
 

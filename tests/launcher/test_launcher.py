@@ -98,14 +98,14 @@ def test_services_are_handed_loopback_addresses(tmp_path: Path) -> None:
         print({name: value for name, value in sorted(os.environ.items()) if name.startswith("MEDOR_")})
     """
     containers = """
+        x-container:
+          bus: &bus {MEDOR_BUS__ROUTER: tcp/router:7447}
+          door: &door {MEDOR_GATEWAY__HOST: 0.0.0.0, MEDOR_GATEWAY__KEYS: "${MEDOR_GATEWAY__KEYS?who may call}"}
         services:
           gateway:
             command: [python, fake.py]
             profiles: [sim]
-            environment:
-              MEDOR_GATEWAY__HOST: 0.0.0.0
-              MEDOR_BUS__ROUTER: tcp/router:7447
-              MEDOR_GATEWAY__KEYS: "${MEDOR_GATEWAY__KEYS?who may call}"
+            environment: {<<: [*bus, *door], MEDOR_GATEWAY__PLANS_KEPT: 7}
     """
     with Launcher(file=write_cell(tmp_path, containers, told), environment={"MEDOR_X": "y"}, echo=False) as cell:
         eventually(lambda: cell.processes["gateway"].tail)
@@ -114,5 +114,6 @@ def test_services_are_handed_loopback_addresses(tmp_path: Path) -> None:
     assert f"http://127.0.0.1:{environment['MEDOR_GATEWAY__PORT']}" == cell.url
     assert environment["MEDOR_BUS__ROUTER"] == cell.router
     assert environment["MEDOR_BUS__ID"] == "gateway"
-    assert environment["MEDOR_GATEWAY__KEYS"] == ""
+    assert environment["MEDOR_GATEWAY__PLANS_KEPT"] == "7"
+    assert "MEDOR_GATEWAY__KEYS" not in environment
     assert environment["MEDOR_X"] == "y"

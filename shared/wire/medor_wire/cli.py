@@ -46,6 +46,7 @@ def demo(
     candidates: int = 100,
     out: Path = Path("runs/demo"),
     url: str | None = None,
+    key: str = "",
 ) -> int:
     """Crumple a garment in a simulated cell and unfold it; writes episode.json and report.html.
 
@@ -58,6 +59,7 @@ def demo(
         candidates: pick-and-places imagined per pick.
         out: folder for the results.
         url: of a running cell; without it one is started and ended.
+        key: API key of that cell, when it asks for one.
     """
     words = {
         "method": method,
@@ -67,6 +69,7 @@ def demo(
         "picks": picks,
         "candidates": candidates,
         "out": out,
+        "key": key,
     }
     options = [text for name, value in words.items() for text in (f"--{name}", str(value))]
 
@@ -75,7 +78,8 @@ def demo(
 
     if url is not None:
         return play(url)
-    with Launcher("sim", echo=False) as cell:
+    open_door = {"MEDOR_GATEWAY__KEYS": ""}
+    with Launcher("sim", environment=open_door, logs=out.resolve() / "logs", echo=False) as cell:
         seconds = cell.wait_ready()
         cell.output.say(f"cell ready after {seconds:.1f} s at {cell.url}, logs in {cell.output.folder}")
         return play(cell.url)

@@ -60,14 +60,17 @@ def find(start: Path | None = None) -> Path:
 
 
 def read(path: Path, environment: Mapping[str, str]) -> dict[str, Service]:
-    """Services by name, `${...}` filled in from `environment`.
+    """Services by name, `${...}` filled in from `environment`, settings for containers only (`x-container`) left out.
 
     Raises:
         ComposeError: not readable, or a service without a command.
     """
     try:
         content = yaml.safe_load(path.read_text())
-        services = interpolate(content["services"], environment)
+        inside = {name for block in content.get("x-container", {}).values() for name in block}
+        services = {
+            name: interpolate(_without(entry, inside), environment) for name, entry in content["services"].items()
+        }
         return {name: Service.model_validate(entry) for name, entry in services.items()}
     except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError, ValidationError) as error:
         raise ComposeError(f"{path}: {error}") from error
@@ -88,6 +91,11 @@ def replicas(services: Mapping[str, Service], profile: str) -> list[Replica]:
         if service.runs_in(profile)
         for i in range(1, service.deploy.replicas + 1)
     ]
+
+
+def _without(entry: dict[str, Any], names: set[str]) -> dict[str, Any]:
+    settings = entry.get("environment", {})
+    return {**entry, "environment": {name: value for name, value in settings.items() if name not in names}}
 
 
 VARIABLE = re.compile(r"\$(?:\$|(?P<plain>\w+)|\{(?P<name>\w+)(?:(?P<rule>:?[-?])(?P<text>[^}]*))?\})")

@@ -92,7 +92,7 @@ def services() -> list[Finding]:
     """Whether what compose.yaml starts can be imported, each in a process of its own: a bad native library may
     take its process down."""
     try:
-        declared = compose.read(compose.find(), {"MEDOR_GATEWAY__KEYS": "", **os.environ})
+        declared = compose.read(compose.find(), os.environ)
     except compose.ComposeError as error:
         return [Finding(subject=compose.FILE, state="wrong", found=str(error), remedy="run this inside a checkout")]
     modules = [service.command[2] for service in declared.values() if service.command[1:2] == ("-m",)]

@@ -14,6 +14,7 @@ import urllib.request
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Self
 
 from medor_wire import compose
@@ -80,8 +81,8 @@ class Launcher:
         require_free(self.port, "--port")
         require_free(int(self.router.rpartition(":")[2]), "--router-port")
         given = {**os.environ, **(environment or {})}
-        # Keys guard a door that others can reach; this one is on loopback.
-        services = compose.read(file, {"MEDOR_GATEWAY__KEYS": "", **given})
+        self._state = TemporaryDirectory(prefix="medor-", ignore_cleanup_errors=True)
+        services = compose.read(file, {**given, "MEDOR_STATE": self._state.name})
         self.output = Output(file.parent / logs, echo=echo)
         self._supervisor = Supervisor(
             [
@@ -110,6 +111,7 @@ class Launcher:
     def start(self) -> Self:
         """Starts the router and every process; does not wait for them."""
         with ExitStack() as opened:
+            opened.enter_context(self._state)
             opened.enter_context(self.output)
             opened.enter_context(routing(self.router))
             self.bus = opened.enter_context(join("launcher", BusConfig(router=self.router)))

@@ -4,12 +4,12 @@ A router of its own is the process `python -m medor_wire.router`; the launcher h
 """
 
 import contextlib
-import signal
 import threading
 from collections.abc import Iterator
 
 import zenoh
 
+from medor_wire.bus import join
 from medor_wire.config import BusConfig, Settings
 from medor_wire.zenoh_config import router_config
 
@@ -40,12 +40,9 @@ def routing(listen: str, bus: BusConfig | None = None) -> Iterator[None]:
 
 
 def main(config: Config) -> None:
-    """Route until SIGTERM or SIGINT."""
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
-    with routing(config.listen, config.bus):
-        stop.wait()
+    """Route until SIGTERM or SIGINT; a member of the bus itself, so that its health shows like everyone's."""
+    with routing(config.listen, config.bus), join("router", config.bus) as bus:
+        bus.run()
 
 
 if __name__ == "__main__":
