@@ -40,6 +40,17 @@ class Message(BaseModel):
                     raise ValueError(f"dimension {dim} is {seen} in {where} but {size} in {name}")
         return self
 
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        return all(_same(getattr(self, name), getattr(other, name)) for name in type(self).model_fields)
+
+
+def _same(one: object, other: object) -> bool:
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return np.array_equal(one, other)  # type: ignore[arg-type]
+    return one == other
+
 
 @cache
 def array_fields(message: type[Message]) -> dict[str, Shape]:
@@ -216,6 +227,8 @@ class ActOutcome(Message):
     arm_reached: bool = True
     """False when the arm could not follow the flying picker to the end of the path."""
     seconds: float = 0.0
+    detail: str = ""
+    """What else there is to say, such as that nothing moved in a dry run."""
 
 
 class ReachRequest(Message):

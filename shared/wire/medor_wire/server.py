@@ -11,7 +11,7 @@ from medor_wire import codec
 from medor_wire.bus import Call
 from medor_wire.endpoints import Endpoint
 from medor_wire.envelope import Envelope
-from medor_wire.errors import BadFrame, Busy, InternalError, MedorError, Unavailable
+from medor_wire.errors import BadFrame, Busy, Cancelled, InternalError, MedorError, Unavailable
 from medor_wire.messages import Message
 from medor_wire.transport import Incoming
 
@@ -95,13 +95,16 @@ class Server:
         job = _Job(incoming, envelope, call, arrived)
         with self._lock:
             if self._closed:
-                raise Unavailable(f"{self.endpoint.name} is leaving")
+                raise self._leaving()
             if len(self._jobs) >= self._capacity:
                 raise Busy(f"{self.endpoint.name} has {len(self._jobs)} requests, its limit")
             if envelope.ask in self._jobs:
                 raise BadFrame(f"ask {envelope.ask} came twice")
             self._jobs[envelope.ask] = job
         self._queue.put(job)
+
+    def _leaving(self) -> Unavailable:
+        return Unavailable(f"{self.endpoint.name} is leaving the bus")
 
     def _work(self) -> None:
         while (job := self._queue.get()) is not None:
@@ -116,7 +119,7 @@ class Server:
             answer = codec.encode(self._handler(request, job.call))
             error = None
         except MedorError as raised:
-            answer, error = b"", raised
+            answer, error = b"", self._leaving() if self._closed and isinstance(raised, Cancelled) else raised
         except Exception:
             self._defect(self.endpoint.name, job.call.request_id)
             name, request_id = self.endpoint.name, job.call.request_id
