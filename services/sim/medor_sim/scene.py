@@ -97,7 +97,7 @@ class Scene:
         mesh = ClothMesh(
             vertices=self.cloth.positions,
             faces=garment.faces,
-            category=garment.category,  # pyright: ignore[reportArgumentType]  (a str there, checked by the message)
+            category=self.piece.category,
             visible=visible_vertices(self.cloth.positions, garment.faces, camera),
             canonical=garment.vertices,
             panel_uv=garment.panel_uv,

@@ -11,6 +11,7 @@ from medor_sim.simulator import Simulator
 from medor_sim.wardrobe import Wardrobe
 from medor_wire import endpoints
 from medor_wire.bus import Bus, join
+from medor_wire.cell import serve_cell
 from medor_wire.config import Settings
 from medor_wire.lease import Lessor
 from medor_wire.ledger import Ledger
@@ -26,20 +27,12 @@ class Config(Settings, section="sim"):
     """Garments kept with their flat state and goals; as many uploaded ones."""
 
 
-def serve(bus: Bus, simulator: Simulator, lessor: Lessor) -> None:
-    """Every endpoint of the simulated cell. Reads have their own workers, so that they answer during an action."""
-    bus.serve(endpoints.CAPTURE, simulator.capture)
-    bus.serve(endpoints.STATUS, simulator.status)
-    bus.serve(endpoints.REACH, simulator.reach)
-    bus.serve(endpoints.LEASE, simulator.lease)
-    bus.serve(endpoints.ACT, simulator.act)
-    bus.serve(endpoints.CLEAR_STOP, simulator.clear_stop)
+def serve(bus: Bus, simulator: Simulator, motion: Motion) -> None:
+    serve_cell(bus, simulator, motion.lessor)
     bus.serve(endpoints.RESET, simulator.reset)
     bus.serve(endpoints.SCORE, simulator.score)
     bus.serve(endpoints.TRUTH, simulator.truth)
     bus.serve(endpoints.UPLOAD_GARMENT, simulator.upload_garment)
-    bus.subscribe(endpoints.STOP, simulator.stop)
-    bus.on_presence(lessor.gone)
 
 
 def warm_up() -> None:
@@ -52,11 +45,10 @@ def warm_up() -> None:
 
 def main(config: Config) -> None:
     ledger = Ledger(config.ledger)
-    lessor = Lessor(ledger)
+    motion = Motion(ledger, Lessor(ledger))
     with join("sim", config.bus) as bus:
         bus.ready(False, "warming up")
-        simulator = Simulator(Motion(ledger, lessor), Wardrobe(config.garments), bus.publish)
-        serve(bus, simulator, lessor)
+        serve(bus, Simulator(motion, Wardrobe(config.garments), bus.publish), motion)
         warm_up()
         bus.ready()
         bus.run()

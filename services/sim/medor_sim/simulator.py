@@ -1,6 +1,5 @@
 """The simulated cell: answers as a robot does, plus what only a simulation can (reset, score, truth, upload)."""
 
-import logging
 import time
 from collections.abc import Callable
 
@@ -19,8 +18,6 @@ from medor_wire.bus import Call
 from medor_wire.endpoints import Topic
 from medor_wire.errors import BadRequest, OutOfReach, Refused
 from medor_wire.motion import Check, Motion
-
-log = logging.getLogger(__name__)
 
 Tell = Callable[[Topic, m.Message], None]
 
@@ -63,28 +60,12 @@ class Simulator:
         return m.DepthView(depth=depth, mask=mask, camera=self._camera_info, stamp_ns=time.time_ns())
 
     def status(self, request: m.Empty, call: Call) -> m.CellStatus:
-        lessor, scene = self._motion.lessor, self._scene
-        return m.CellStatus.model_validate(
-            {
-                "cell": "sim",
-                "state": self._motion.state,
-                "category": scene.piece.garment.category if scene else None,
-                "holder": lessor.holder,
-                "epoch": lessor.epoch,
-                "actions": self._motion.actions,
-                "camera": self._camera_info,
-                "detail": lessor.stopped or "",
-            }
-        )
+        scene = self._scene
+        category = scene.piece.category if scene else None
+        return self._motion.status("sim", category=category, camera=self._camera_info)
 
     def reach(self, request: m.ReachRequest, call: Call) -> m.Reach:
         return m.Reach(reachable=self._reach_map.reachable(request.points))
-
-    def lease(self, request: m.LeaseRequest, call: Call) -> m.Lease:
-        lease = self._motion.lessor.lease(request, call)
-        if request.action != "renew":
-            self._tell_status()
-        return lease
 
     def act(self, request: m.ActRequest, call: Call) -> m.ActOutcome:
         """One pick-and-place; the arm follows the flying picker as well as it can.
@@ -93,21 +74,12 @@ class Simulator:
             OutOfReach: the pick or the place; nothing has moved.
             Refused: nothing lies on the table, or what `Motion.act` says.
         """
-        outcome = self._motion.act(request, call, allow=self._allow, move=self._move)
+        try:
+            outcome = self._motion.act(request, call, allow=self._allow, move=self._move)
+        finally:
+            self._tell_scene()  # also after a motion that was stopped half way
         self._tell(endpoints.ACTION, outcome)
         return outcome
-
-    def stop(self, order: m.EmergencyStop) -> None:
-        """Latch the emergency stop."""
-        self._motion.lessor.stop(order)
-        log.warning("emergency stop: %s", self._motion.lessor.stopped)
-        self._tell_status()
-
-    def clear_stop(self, order: m.ClearStop, call: Call) -> m.CellStatus:
-        self._motion.lessor.clear_stop(order)
-        log.warning("emergency stop cleared by %s", order.operator)
-        self._tell_status()
-        return self.status(m.Empty(), call)
 
     # --- simulation only ------------------------------------------------------------------------------------------
 
@@ -163,11 +135,11 @@ class Simulator:
 
     def _move(self, request: m.ActRequest, check: Check) -> m.ActOutcome:
         start = time.perf_counter()
+        self._tell(endpoints.CELL, self.status(m.Empty(), Call()))
         pulled = self._require_scene().pulled(request.pick, request.place, check)
         short = self._world.arm.follow(pull(request.pick, request.place))
         self._world.arm.park()
         self._scene = pulled.scene
-        self._tell_scene()
         if pulled.stopped is not None:
             raise pulled.stopped
         return m.ActOutcome(
@@ -177,9 +149,6 @@ class Simulator:
             seconds=time.perf_counter() - start,
         )
 
-    def _tell_status(self) -> None:
-        self._tell(endpoints.CELL, self.status(m.Empty(), Call()))
-
     def _tell_scene(self) -> None:
         self._tell(endpoints.DEPTH, self.capture(m.Empty(), Call()))
-        self._tell_status()
+        self._tell(endpoints.CELL, self.status(m.Empty(), Call()))

@@ -19,11 +19,11 @@ from medor_wire.messages import Category
 class Piece:
     """One garment, its solver, its flattened state and its goals."""
 
-    def __init__(self, id: str, garment: Garment) -> None:
+    def __init__(self, id: str, category: Category, garment: Garment) -> None:
         self.id = id
+        self.category: Category = category
         self.garment = garment
         self.solver = solver_of(garment)
-        self._goals_lock = threading.Lock()
 
     @cached_property
     def flat(self):
@@ -60,7 +60,7 @@ class Wardrobe:
         with self._lock:
             if id not in self._generated:
                 try:
-                    self._keep(self._generated, Piece(id, generate(category, seed)))
+                    self._keep(self._generated, Piece(id, category, generate(category, seed)))
                 except ClothError as error:
                     raise BadRequest(f"garment_seed: {error}") from error
             self._generated.move_to_end(id)
@@ -86,7 +86,7 @@ class Wardrobe:
         """
         id = f"{category}-{hashlib.sha256(category.encode() + content).hexdigest()[:12]}"
         try:
-            piece = Piece(id, load_mesh(content, category, file_type))
+            piece = Piece(id, category, load_mesh(content, category, file_type))
         except ClothError as error:
             raise BadRequest(f"content: {error}") from error
         with self._lock:

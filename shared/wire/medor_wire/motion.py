@@ -8,7 +8,7 @@ from medor_wire.bus import Call
 from medor_wire.errors import Cancelled
 from medor_wire.lease import Lessor
 from medor_wire.ledger import Ledger
-from medor_wire.messages import ActOutcome, ActRequest
+from medor_wire.messages import ActOutcome, ActRequest, CameraInfo, Category, CellStatus
 
 Check = Callable[[], None]
 """Raises when the motion must not go on: emergency stop, lease lost, cancelled."""
@@ -31,6 +31,25 @@ class Motion:
         if self.lessor.stopped is not None:
             return "stopped"
         return "moving" if self._moving else "idle"
+
+    def status(
+        self,
+        cell: Literal["sim", "robot"],
+        category: Category | None = None,
+        camera: CameraInfo | None = None,
+        detail: str = "",
+    ) -> CellStatus:
+        """State of the cell; a latched stop's reason comes before `detail`."""
+        return CellStatus(
+            cell=cell,
+            state=self.state,
+            category=category,
+            holder=self.lessor.holder,
+            epoch=self.lessor.epoch,
+            actions=self.actions,
+            camera=camera,
+            detail="; ".join(filter(None, (self.lessor.stopped, detail))),
+        )
 
     def alone(self) -> threading.Lock:
         """Hold this to change what lies on the table without an action in between."""
