@@ -130,18 +130,17 @@ def rims(made: Garment) -> list[np.ndarray]:
     return [np.flatnonzero(label == k) for k in np.unique(label[rim])]
 
 
-@pytest.mark.parametrize("category", ["dress", "skirt"])
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("category", "seed"), [("dress", 800_019), ("dress", 800_033), ("skirt", 800_005)])
 def test_a_skirt_hangs_down(category, seed):
-    """Pressure that lifts would turn a wide skirt over the bodice: the hem hangs as low as it is cut."""
-    made = garment(category, seed)
+    """Pressure that lifts would raise a wide skirt towards the bodice: the hem hangs as low as it is cut."""
+    made = garment(category, seed, 0.016)
     drawn = np.zeros(len(made.vertices))
     drawn[made.faces.ravel()] = uv_of(made)[..., 1].ravel()
     *upper, hem = sorted(rims(made), key=lambda rim: -drawn[rim].mean())
     top = np.concatenate(upper)
     worn = made.vertices[:, 2]
     assert worn[hem].max() < worn[top].min()
-    assert worn[top].mean() - worn[hem].mean() > 0.8 * (drawn[top].mean() - drawn[hem].mean())
+    assert worn[top].mean() - worn[hem].mean() > 0.88 * (drawn[top].mean() - drawn[hem].mean())
 
 
 def test_steep_short_sleeves_stay_clean():
