@@ -1,8 +1,9 @@
 """A cell small enough for a test: the door's counterparts on an in-process bus, with a table of their own."""
 
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import NoReturn
 
 import httpx
 import numpy as np
@@ -55,7 +56,7 @@ class SmallCell:
         cloth = np.maximum(abs(x - WIDTH / 2), abs(y - WIDTH / 2)) < camera.K[0, 0] * self.size_m / 2 / 0.65
         info = m.CameraInfo(K=camera.K, T_world_camera=camera.T_world_camera, width=WIDTH, height=WIDTH)
         depth = np.where(cloth, 0.648 - 0.0004 * x, 0.0).astype(np.float32)
-        return m.DepthView(depth=depth, camera=info, mask=cloth, stamp_ns=7)
+        return m.DepthView(depth=depth, camera=info, mask=cloth, stamp_ns=1_800_000_000_123_456_789)
 
     def status(self, _: m.Empty, call: Call) -> m.CellStatus:
         return m.CellStatus(cell="sim", state="stopped" if self.stopped else "idle", actions=self.acts)
@@ -158,7 +159,7 @@ class SmallCell:
         return m.Episode(ni=score.ni_flatten, picks=tuple(steps), flat_coverage_m2=self.FLAT_M**2, reason=reason)
 
 
-def unused(request: m.Message, call: Call) -> m.Message:
+def unused(request: m.Message, call: Call) -> NoReturn:
     raise AssertionError("the door asks neither recon nor dynamics")
 
 
@@ -187,6 +188,19 @@ class Members:
     def close(self) -> None:
         for member in self.all:
             member.close()
+
+
+@pytest.fixture(scope="session")
+def small_cell() -> Callable[[LocalBus], AbstractContextManager[None]]:
+    """Brings a small cell to a bus, for as long as the context lasts."""
+
+    @contextmanager
+    def present(bus: LocalBus) -> Iterator[None]:
+        members = Members(bus, SmallCell())
+        yield
+        members.close()
+
+    return present
 
 
 @pytest.fixture

@@ -82,14 +82,22 @@ def test_the_page_needs_nothing_from_elsewhere(door: httpx.Client) -> None:
     assert "https://" not in page.text
 
 
-def test_an_unexpected_defect_is_a_problem_without_its_traceback(door: httpx.Client, bus, monkeypatch) -> None:
+def test_a_defect_shows_its_traceback_to_the_log_only_and_keys_to_nobody(
+    door: httpx.Client, bus, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     def broken(service: str) -> list:
         raise ZeroDivisionError("a secret")
 
+    logs.configure("json")
     monkeypatch.setattr(bus, "instances", broken)
-    answer = door.get("/readyz")
+    answer = door.get("/readyz", headers={"X-API-Key": "key-of-the-user"})
+    log = capsys.readouterr().err
+    structlog.reset_defaults()
     assert (answer.status_code, answer.json()["code"]) == (500, "internal")
     assert "secret" not in answer.text
+    assert "a secret" in log
+    assert answer.json()["request_id"] in log
+    assert "key-of-the-user" not in log
 
 
 def test_refusals_of_the_bus_are_answered_as_themselves(door: httpx.Client, bus, monkeypatch) -> None:

@@ -94,7 +94,8 @@ def test_glb_stands_upright_without_being_mirrored(mesh: ClothMesh) -> None:
 
 def test_colours_tell_what_the_camera_saw(mesh: ClothMesh) -> None:
     read = trimesh.load_mesh(io.BytesIO(mesh_file(mesh, "ply")), file_type="ply", process=False)
-    colours = {tuple(colour) for colour in read.visual.vertex_colors[mesh.visible]}
-    hidden = {tuple(colour) for colour in read.visual.vertex_colors[~mesh.visible]}
+    given = read.visual.vertex_colors  # pyright: ignore[reportAttributeAccessIssue, reportOptionalMemberAccess]
+    colours = {tuple(colour) for colour in given[mesh.visible]}
+    hidden = {tuple(colour) for colour in given[~mesh.visible]}
     assert len(colours) == len(hidden) == 1
     assert colours != hidden

@@ -44,7 +44,7 @@ def test_what_the_camera_saw_can_be_sent_back_as_observation(door: httpx.Client,
     assert (view.mask == truth.mask).all()
     assert (view.camera.K == truth.camera.K).all()
     assert (view.camera.T_world_camera == truth.camera.T_world_camera).all()
-    assert view.stamp_ns == truth.stamp_ns
+    assert abs(view.stamp_ns - truth.stamp_ns) < 1000
 
 
 def test_executing_twice_moves_once(door: httpx.Client, cell) -> None:

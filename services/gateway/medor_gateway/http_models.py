@@ -13,6 +13,8 @@ from medor_gateway.jobs import Status
 from medor_gateway.media import decode_depth, decode_mask, encode_depth, encode_mask
 from medor_gateway.problem import Problem
 from medor_wire.messages import (
+    F4,
+    F8,
     ActOutcome,
     CameraInfo,
     Category,
@@ -42,46 +44,52 @@ Text = Annotated[str, AfterValidator(_unicode)]
 Seed = Annotated[int, Field(ge=0, lt=2**31, description="The same seed gives the same result.")]
 MethodName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,63}$", description="A named planner preset.")]
 EndReason = Literal["solved", "max_picks", "no_op"]
+Triple = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 Point = tuple[float, float, float]
-Row3 = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat], Field(strict=False)]
-Row4 = Annotated[tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat], Field(strict=False)]
+Quadruple = Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]
 Png = Annotated[
     str,
     Field(max_length=48 << 20, json_schema_extra={"contentEncoding": "base64", "contentMediaType": "image/png"}),
 ]
 
 
-class HttpModel(BaseModel):
-    """Base of everything JSON."""
+class Command(BaseModel):
+    """Base of what is sent to the door."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Report(BaseModel):
+    """Base of what the door answers. Messages may have more to say."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
 
 
 def _example(**values: Any) -> ConfigDict:
     return ConfigDict(json_schema_extra={"examples": [values]})
 
 
-def point(xyz: Any) -> Point:
+def point(xyz: F4 | F8) -> Point:
     """An array of three as a JSON list."""
-    x, y, z = (float(value) for value in xyz)
+    x, y, z = xyz.tolist()
     return x, y, z
 
 
 # --- what the camera sees -------------------------------------------------------------------------------------
 
 
-class Observation(HttpModel):
+class Observation(Command):
     """One depth image and where it was taken. What `GET /cell/observation` answers, `POST /plan` accepts."""
 
     depth_png: Annotated[Png, Field(description="16-bit grey PNG; 0: nothing measured.")]
     depth_unit_m: Annotated[float, Field(gt=0, le=0.01, description="Metres per step of the PNG.")] = PNG_UNIT_M
     mask_png: Annotated[Png, Field(description="8-bit PNG, not 0 on the garment.")] | None = None
-    K: Annotated[tuple[Row3, Row3, Row3], Field(strict=False, description="Camera intrinsics [px].")]
+    K: Annotated[list[Triple], Field(min_length=3, max_length=3, description="Camera intrinsics [px], 3 x 3.")]
     T_world_camera: Annotated[
-        tuple[Row4, Row4, Row4, Row4],
-        Field(strict=False, description="Camera pose; axes x right, y down, z forward (OpenCV)."),
+        list[Quadruple],
+        Field(min_length=4, max_length=4, description="Camera pose, 4 x 4; x right, y down, z forward (OpenCV)."),
     ]
-    stamp_ns: Annotated[int, Field(ge=0, lt=2**63, description="Time of capture since the epoch.")] = 0
+    stamp_s: Annotated[float, Field(ge=0, le=1e11, description="Time of capture since the epoch.")] = 0.0
 
     model_config = _example(
         depth_png=encode_depth(np.full((8, 8), 0.65, np.float32)),
@@ -96,7 +104,7 @@ class Observation(HttpModel):
             mask_png=None if view.mask is None else encode_mask(view.mask),
             K=view.camera.K.tolist(),
             T_world_camera=view.camera.T_world_camera.tolist(),
-            stamp_ns=view.stamp_ns,
+            stamp_s=view.stamp_ns / 1e9,
         )
 
     def view(self) -> DepthView:
@@ -111,13 +119,13 @@ class Observation(HttpModel):
             K=np.array(self.K), T_world_camera=np.array(self.T_world_camera), width=width, height=height
         )
         mask = None if self.mask_png is None else decode_mask(self.mask_png)
-        return DepthView(depth=depth, camera=camera, mask=mask, stamp_ns=self.stamp_ns)
+        return DepthView(depth=depth, camera=camera, mask=mask, stamp_ns=round(self.stamp_s * 1e9))
 
 
 # --- the cell -------------------------------------------------------------------------------------------------
 
 
-class ResetCommand(HttpModel):
+class ResetCommand(Command):
     """Put a garment on the table of the simulated cell."""
 
     category: Category = "tshirt"
@@ -134,7 +142,7 @@ class ResetCommand(HttpModel):
         return ResetRequest.model_validate(self.model_dump())
 
 
-class ScoreReport(HttpModel):
+class ScoreReport(Report):
     """The simulator's figures for the state on the table."""
 
     coverage_m2: float
@@ -149,7 +157,7 @@ class ScoreReport(HttpModel):
         return cls.model_validate(score.model_dump())
 
 
-class GarmentReport(HttpModel):
+class GarmentReport(Report):
     """An uploaded garment."""
 
     garment_id: str
@@ -161,7 +169,7 @@ class GarmentReport(HttpModel):
         return cls.model_validate(garment.model_dump())
 
 
-class CellReport(HttpModel):
+class CellReport(Report):
     """The state of the cell."""
 
     cell: Literal["sim", "robot"]
@@ -177,19 +185,19 @@ class CellReport(HttpModel):
         return cls.model_validate(status.model_dump(exclude={"camera"}))
 
 
-class StopCommand(HttpModel):
+class StopCommand(Command):
     reason: Annotated[Text, Field(max_length=256)] = ""
 
     model_config = _example(reason="a hand on the table")
 
 
-class StopReport(HttpModel):
+class StopReport(Report):
     """The stop is on its way; `GET /cell/status` says when the cell has latched it."""
 
     sent: Literal[True] = True
 
 
-class ClearCommand(HttpModel):
+class ClearCommand(Command):
     """An operator's word that it is safe to move again."""
 
     operator: Annotated[Text, Field(min_length=1, max_length=128)]
@@ -200,12 +208,12 @@ class ClearCommand(HttpModel):
 # --- planning -------------------------------------------------------------------------------------------------
 
 
-class PlanOptions(HttpModel):
+class PlanOptions(Command):
     candidates: Annotated[int, Field(ge=1, le=5000, description="Pick-and-places tried in the model.")] = 100
     seed: Seed = 0
 
 
-class PlanCommand(HttpModel):
+class PlanCommand(Command):
     """Choose the best pick-and-place for what is seen."""
 
     category: Category
@@ -227,7 +235,7 @@ class PlanCommand(HttpModel):
         )
 
 
-class Action(HttpModel):
+class Action(Report):
     """A pick-and-place: where the picker closes and where it opens."""
 
     pick: Point
@@ -238,20 +246,20 @@ class Candidate(Action):
     reward: float
 
 
-class Predicted(HttpModel):
+class Predicted(Report):
     """Flatten: coverage [m²]. Canonicalize: minus the mean distance to the best goal [m]."""
 
     reward: float
     no_op_reward: float = Field(description="Of doing nothing.")
 
 
-class MeshLink(HttpModel):
+class MeshLink(Report):
     url: str = Field(examples=["/meshes/5f2a.glb"])
     vertices: int
     faces: int
 
 
-class PlanResult(HttpModel):
+class PlanResult(Report):
     plan_id: str
     category: Category
     task: Task
@@ -282,12 +290,12 @@ class PlanResult(HttpModel):
         )
 
 
-class Progress(HttpModel):
+class Progress(Report):
     stage: str
     fraction: float
 
 
-class PlanState(HttpModel):
+class PlanState(Report):
     """A plan in the making, or made."""
 
     id: str
@@ -297,7 +305,7 @@ class PlanState(HttpModel):
     error: Problem | None
 
 
-class OutcomeReport(HttpModel):
+class OutcomeReport(Report):
     """What became of a pick-and-place."""
 
     action_id: str
@@ -305,6 +313,7 @@ class OutcomeReport(HttpModel):
     replayed: bool = Field(description="True: the recorded outcome of an earlier call; nothing moved now.")
     arm_reached: bool
     seconds: float
+    detail: str
 
     @classmethod
     def of(cls, outcome: ActOutcome) -> "OutcomeReport":
@@ -314,11 +323,11 @@ class OutcomeReport(HttpModel):
 # --- episodes -------------------------------------------------------------------------------------------------
 
 
-class EpisodeOptions(HttpModel):
+class EpisodeOptions(Command):
     candidates: Annotated[int, Field(ge=1, le=5000)] = 100
 
 
-class EpisodeCommand(HttpModel):
+class EpisodeCommand(Command):
     """Unfold in closed loop. Without a garment and a start state: go on from what lies on the table."""
 
     category: Category = "tshirt"
@@ -358,7 +367,7 @@ class EpisodeCommand(HttpModel):
         )
 
 
-class PickReport(HttpModel):
+class PickReport(Report):
     """One step of an episode. Index 0 is the start, without an action."""
 
     index: int
@@ -388,7 +397,7 @@ class PickDetail(PickReport):
     plan: PlanResult | None
 
 
-class EpisodeState(HttpModel):
+class EpisodeState(Report):
     id: str
     status: Status
     category: Category
@@ -403,14 +412,14 @@ class EpisodeState(HttpModel):
     error: Problem | None
 
 
-class EpisodeList(HttpModel):
+class EpisodeList(Report):
     episodes: list[EpisodeState] = Field(description="Newest first.")
 
 
 # --- health ---------------------------------------------------------------------------------------------------
 
 
-class InstanceHealth(HttpModel):
+class InstanceHealth(Report):
     id: str
     ready: bool = Field(description="Alive, warm, and heard of lately.")
     age_s: float | None = Field(description="Since its last heartbeat.")
@@ -419,17 +428,17 @@ class InstanceHealth(HttpModel):
     detail: str
 
 
-class ServiceHealth(HttpModel):
+class ServiceHealth(Report):
     ready: bool = Field(description="At least one instance is.")
     instances: list[InstanceHealth]
 
 
-class Readiness(HttpModel):
+class Readiness(Report):
     ready: bool = Field(description="All required services are.")
     services: dict[str, ServiceHealth]
 
 
-class Alive(HttpModel):
+class Alive(Report):
     status: Literal["ok"] = "ok"
     version: str
     uptime_s: float

@@ -7,7 +7,6 @@ import uuid
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Generic, Literal, TypeVar
 
 from medor_gateway.problem import Problem, problem_of
@@ -79,7 +78,7 @@ class Job(Generic[Record]):
         finally:
             self._followers.discard(wake)
 
-    def run(self, work: Callable[["Job[Record]"], None]) -> None:
+    def run(self, work: Callable[["Job[Record]"], object]) -> None:
         """Do the work; whatever it raises becomes the job's error."""
         try:
             work(self)
@@ -116,7 +115,7 @@ class Jobs(Generic[Record]):
         self._jobs: dict[str, Job[Record]] = {}
         self._lock = threading.Lock()
 
-    def start(self, record: Record, work: Callable[[Job[Record]], None]) -> Job[Record]:
+    def start(self, record: Record, work: Callable[[Job[Record]], object]) -> Job[Record]:
         """Begin `work` in its own thread.
 
         Raises:
@@ -130,8 +129,8 @@ class Jobs(Generic[Record]):
             for old in ended[: max(0, len(ended) - self._kept + 1)]:
                 del self._jobs[old.id]
             self._jobs[job.id] = job
-        run = partial(contextvars.copy_context().run, job.run, work)  # still on behalf of the request
-        threading.Thread(target=run, name=f"job-{job.id}", daemon=True).start()
+        context = contextvars.copy_context()  # still on behalf of the request
+        threading.Thread(target=lambda: context.run(job.run, work), name=f"job-{job.id}", daemon=True).start()
         return job
 
     def find(self, name: str) -> Job[Record]:
