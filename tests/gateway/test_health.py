@@ -2,7 +2,9 @@ import time
 
 import httpx
 import pytest
+import structlog
 
+from medor_wire import endpoints, logs
 from medor_wire.errors import BadRequest
 
 
@@ -48,8 +50,6 @@ def test_a_service_that_warms_up_is_not_ready_and_says_why(door: httpx.Client, m
 
 
 def test_one_ready_replica_is_enough(door: httpx.Client, bus, members) -> None:
-    from medor_wire import endpoints
-
     second = bus.connect("dynamics-2")
     second.serve(endpoints.FLATTEN, lambda request, call: request)
     second.ready()
