@@ -5,6 +5,7 @@ import json
 import threading
 import time
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class ReplayCamera:
             path = next(self._turn)
         try:
             return self._read(path)
-        except (OSError, KeyError, ValueError) as error:
+        except (OSError, KeyError, ValueError, BadZipFile) as error:
             raise Refused(f"the recorded view {path} cannot be used: {error!r}") from error
 
     def _read(self, path: Path) -> DepthView:
