@@ -173,6 +173,18 @@ def test_same_seed_same_garment():
     np.testing.assert_array_equal(uv_of(once), uv_of(again))
 
 
+def test_a_flawed_attempt_is_replaced_by_the_next_and_too_many_are_an_error(monkeypatch):
+    first = generate("skirt", 800_002, edge_m=0.02)
+    flawed = smallest_angle_deg(uv_of(first)) + 0.1
+    monkeypatch.setattr("medor_cloth.garment.MIN_ANGLE_DEG", flawed)
+    second, again = (generate("skirt", 800_002, edge_m=0.02) for _ in range(2))
+    assert smallest_angle_deg(uv_of(second)) >= flawed
+    np.testing.assert_array_equal(second.vertices, again.vertices)
+    monkeypatch.setattr("medor_cloth.garment.MIN_ANGLE_DEG", 61.0)
+    with pytest.raises(GarmentError, match=r"no valid skirt for seed 800002 .*needle triangles"):
+        generate("skirt", 800_002, edge_m=0.02)
+
+
 def test_another_seed_is_another_garment():
     sizes = [np.ptp(garment("trousers", 800_000 + k, 0.02).vertices, axis=0) for k in range(5)]
     assert np.ptp(sizes, axis=0)[[0, 2]].min() > 0.03

@@ -64,7 +64,15 @@ class _Springs:
 class _Inflation:
     """One factored system; each step projects the springs on their lengths and solves."""
 
-    def __init__(self, sewn, pattern, springs, laplacian, area, start) -> None:
+    def __init__(
+        self,
+        sewn: Sewn,
+        pattern: Pattern,
+        springs: _Springs,
+        laplacian: sparse.csr_array,
+        area: NDArray[np.float64],
+        start: NDArray[np.float64],
+    ) -> None:
         edge = float(np.median(springs.rest))
         self.springs, self.faces, self.n = springs, sewn.vertex[sewn.faces], sewn.n_vertices
         self.pressure = PRESSURE / edge
