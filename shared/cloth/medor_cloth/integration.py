@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from medor_cloth.cloth import Springs
 from medor_cloth.contact import part_layers, rest_on_table
 from medor_cloth.picker import nearest_within_reach
-from medor_cloth.proximity import find_candidates, keep_neighbours, left_margin, widen
+from medor_cloth.proximity import expect, find_neighbours, n_astray
 from medor_cloth.springs import damp_springs, relax_springs
 
 FRAME_S = 0.01
@@ -51,22 +51,19 @@ class Physics(NamedTuple):
     spring_damping: np.float32
     settle_speed: np.float32
     cell: np.float32
-    near_margin: np.float32
-    near_horizon: np.float32
-    far_margin: np.float32
-    far_horizon: np.float32
-    far_limit: np.float32
+    least_margin: np.float32
+    horizon: np.float32
+    stray: np.float32
+    most_margin: np.float32
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def simulate(x, v, reference, margin, picker, path, holding, held, calm, topology: Topology, physics: Physics):
+def simulate(x, v, picker, path, holding, held, calm, topology: Topology, physics: Physics):
     """Moves the cloth through the frames of a picker path, or until it has settled.
 
     Args:
-        x: Positions (V,3) [m], changed in place, as are the next four.
+        x: Positions (V,3) [m], changed in place, as are velocities and picker.
         v: Velocities (V,3) [m/s].
-        reference: Positions (V,3) [m] the contact candidates were last found at.
-        margin: Way each vertex may go from there (V,) [m].
         picker: Position (3,) [m].
         path: Picker position at the end of each frame (T,3) [m].
         holding: Whether the picker is closed in each frame (T,).
@@ -81,22 +78,11 @@ def simulate(x, v, reference, margin, picker, path, holding, held, calm, topolog
     n = len(x)
     inverse_mass = np.ones(n, np.float32)
     before, start = np.empty_like(x), np.empty(3, np.float32)
-    near_reference, near_margin = np.empty_like(x), np.empty(n, np.float32)
     longest = max(_longest(topology.stretch.colours), _longest(topology.bend.colours))
     scratch = np.empty((4, longest), np.float32)
     faces, points, thickness = topology.faces, topology.points, physics.thickness
-    found, near = np.empty(24 * len(points), np.int32), np.empty((8 * len(points), 2), np.int32)
-    starts, found = find_candidates(
-        x=reference,
-        margin=margin,
-        faces=faces,
-        across=topology.across,
-        points=points,
-        thickness=thickness,
-        cell=physics.cell,
-        found=found,
-    )
-    near_starts = starts
+    expected, margin = np.empty_like(x), np.empty(n, np.float32)
+    starts, near = np.empty(0, np.int32), np.empty((4 * len(points), 2), np.int32)
     for frame in range(len(path)):
         held = (held if held >= 0 else nearest_within_reach(x, picker)) if holding[frame] else -1
         if held >= 0:
@@ -111,18 +97,13 @@ def simulate(x, v, reference, margin, picker, path, holding, held, calm, topolog
                 x[held, 2] = max(x[held, 2], thickness * np.float32(0.5))
             relax_springs(x, inverse_mass, topology.bend, physics.bend_compliance, _ONE, scratch)
             relax_springs(x, inverse_mass, topology.stretch, _ZERO, physics.compression, scratch)
-            if substep == 0 or left_margin(x, near_reference, near_margin):
-                widen(v, physics.near_margin, physics.near_horizon, physics.far_margin, near_margin)
-                near_reference[:] = x
-                if left_margin(x, reference, margin - near_margin):
-                    widen(v, physics.far_margin, physics.far_horizon, physics.far_limit, margin)
-                    reference[:] = x
-                    starts, found = find_candidates(
-                        x, margin, faces, topology.across, points, thickness, physics.cell, found
-                    )
-                near_starts, near = keep_neighbours(x, near_margin, faces, points, thickness, starts, found, near)
+            if substep == 0 or n_astray(x, expected, margin) > physics.stray * n:
+                expect(x, v, physics.horizon, physics.least_margin, physics.most_margin, expected, margin)
+                starts, near = find_neighbours(
+                    expected, margin, faces, topology.across, points, thickness, physics.cell, near
+                )
             part_layers(
-                x, before, inverse_mass, faces, near_starts, near, thickness, physics.layer_friction, physics.push_out
+                x, before, inverse_mass, faces, starts, near, thickness, physics.layer_friction, physics.push_out
             )
             rest_on_table(x, before, inverse_mass, thickness * np.float32(0.5), physics.table_friction)
             _update_velocity(x, v, before, physics.step)

@@ -46,8 +46,6 @@ class ClothState:
         picker: Centre of the picker (3,) float32 [m].
         frame: Frames since the cloth was laid down.
         calm: Frames in a row the cloth has been slow for.
-        reference: (V,3) float32 [m], positions at which possible contacts were last listed.
-        margin: (V,) float32 [m], the way each vertex may go from there before they are listed anew.
     """
 
     positions: NDArray[np.float32]
@@ -56,8 +54,6 @@ class ClothState:
     picker: NDArray[np.float32]
     frame: int
     calm: int
-    reference: NDArray[np.float32]
-    margin: NDArray[np.float32]
 
     def copy(self) -> "ClothState":
         """A state that shares no memory with this one."""
@@ -66,8 +62,6 @@ class ClothState:
             positions=self.positions.copy(),
             velocities=self.velocities.copy(),
             picker=self.picker.copy(),
-            reference=self.reference.copy(),
-            margin=self.margin.copy(),
         )
 
     def to_arrays(self) -> dict[str, np.ndarray]:
@@ -110,8 +104,7 @@ class Solver:
         x = np.array(positions, np.float32, order="C")
         if x.shape != (self.cloth.n_vertices, 3) or not np.isfinite(x).all():
             raise ClothError(f"expected finite positions ({self.cloth.n_vertices}, 3), got {x.shape}")
-        margin = np.full(len(x), self._physics.far_margin, np.float32)
-        return ClothState(x, np.zeros_like(x), -1, PARKED.copy(), 0, 0, x.copy(), margin)
+        return ClothState(x, np.zeros_like(x), -1, PARKED.copy(), 0, 0)
 
     def placed(self, state: ClothState, picker: ArrayLike) -> ClothState:
         """The same state with an empty picker at another place (3,) [m]."""
@@ -154,8 +147,6 @@ class Solver:
         done, now.held, now.calm = simulate(
             now.positions,
             now.velocities,
-            now.reference,
-            now.margin,
             now.picker,
             np.ascontiguousarray(path, np.float32),
             closed,
@@ -190,10 +181,9 @@ def _physics(config: SolverConfig, edge: float) -> Physics:
         "spring_damping": config.spring_damping,
         "settle_speed": 0.0,
         "cell": max(0.9 * edge, 2 * config.thickness),
-        "near_margin": 0.0005,
-        "near_horizon": FRAME_S,
-        "far_margin": 0.003,
-        "far_horizon": 5 * FRAME_S,
-        "far_limit": 0.010,
+        "least_margin": 0.0015,
+        "horizon": FRAME_S,
+        "stray": 0.003,
+        "most_margin": 0.003,
     }
     return Physics(config.substeps, **{name: np.float32(value) for name, value in constants.items()})
