@@ -168,8 +168,12 @@ class Bus(Protocol):
         ...
 
 
-def join(id: str, config: BusConfig | None = None) -> AbstractContextManager[Bus]:
-    """A member of the Zenoh bus, closed at the end of the `with` block. `config.id` takes precedence over `id`."""
+def join(id: str, config: BusConfig | None = None, *, patience_s: float = math.inf) -> AbstractContextManager[Bus]:
+    """A member of the Zenoh bus, closed at the end of the `with` block. `config.id` takes precedence over `id`.
+
+    Raises:
+        Unavailable: there is no router within `patience_s`.
+    """
     from medor_wire.zenoh_bus import ZenohBus  # whoever needs only the interface does not load Zenoh
 
-    return ZenohBus(id, config or BusConfig())
+    return ZenohBus(id, config or BusConfig(), patience_s=patience_s)

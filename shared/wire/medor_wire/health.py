@@ -12,6 +12,7 @@ import urllib.request
 
 from medor_wire.bus import join
 from medor_wire.config import BusConfig, Settings
+from medor_wire.errors import Unavailable
 
 STALE_S = 5.0
 """A heartbeat older than this is a process that is stuck."""
@@ -31,7 +32,11 @@ def fault_by_metrics(port: int, host: str = "127.0.0.1") -> str | None:
 
 def fault_by_bus(config: BusConfig) -> str | None:
     """What is wrong with the process `config.id`, as far as the bus knows."""
-    with join("health", config.model_copy(update={"id": "", "metrics_port": 0})) as bus:
+    try:
+        joined = join("health", config.model_copy(update={"id": "", "metrics_port": 0}), patience_s=0)
+    except Unavailable as error:
+        return str(error)
+    with joined as bus:
         deadline = time.monotonic() + LISTEN_S
         while time.monotonic() < deadline:
             beats = [beat for beat in bus.health().values() if config.id in ("", beat.id)]

@@ -5,7 +5,9 @@ Keys: `medor/<cell>/<service>/<id>/<boot>/<verb>` (one concrete instance each, s
 """
 
 import contextlib
+import math
 import threading
+import time
 from collections.abc import Callable
 
 import msgpack
@@ -32,9 +34,14 @@ CLOSE_S = 3.0
 class ZenohBus(Member):
     """A member of the bus, client of the router of its configuration."""
 
-    def __init__(self, id: str, config: BusConfig) -> None:
+    def __init__(self, id: str, config: BusConfig, *, patience_s: float = math.inf) -> None:
+        """Connects, waiting `patience_s` for the router.
+
+        Raises:
+            Unavailable: there is no router.
+        """
         logs.configure(config.log, process=config.id or id)
-        super().__init__(config.id or id, ZenohTransport(config))
+        super().__init__(config.id or id, ZenohTransport(config, patience_s))
         if config.metrics_port:
             self.metrics.serve(config.metrics_port)
 
@@ -66,8 +73,8 @@ class ZenohIncoming:
 class ZenohTransport:
     """Implements `Transport` on one Zenoh session."""
 
-    def __init__(self, config: BusConfig) -> None:
-        self._session = zenoh.open(client_config(config))
+    def __init__(self, config: BusConfig, patience_s: float = math.inf) -> None:
+        self._session = _open(config, patience_s)
         self._cell = f"medor/{config.cell}"
         self._tokens: dict[Instance, zenoh.LivelinessToken] = {}
         self._declared: list[object] = []
@@ -192,6 +199,18 @@ class Watch:
         with contextlib.suppress(zenoh.ZError):  # raised when the subscriber or its session is closed
             while True:
                 listener(frames.recv().payload.to_bytes())
+
+
+def _open(config: BusConfig, patience_s: float) -> zenoh.Session:
+    """A session as soon as there is a router, whoever starts first; interruptible every second."""
+    deadline = time.monotonic() + patience_s
+    while True:
+        try:
+            return zenoh.open(client_config(config))
+        except zenoh.ZError as error:
+            if time.monotonic() >= deadline:
+                raise Unavailable(f"no router at {config.router}: {error}") from error
+            logs.logger("bus").warning("waiting for the router", router=config.router)
 
 
 def _answer(reply: zenoh.Reply) -> Answer:
