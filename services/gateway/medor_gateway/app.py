@@ -20,7 +20,7 @@ from medor_wire.bus import Bus
 
 PAGE = Path(__file__).with_name("page.html")
 PAGE_POLICY = (
-    "default-src 'none'; img-src 'self' blob:; connect-src 'self'; style-src 'unsafe-inline'; "
+    "default-src 'none'; img-src 'self' blob: data:; connect-src 'self'; style-src 'unsafe-inline'; "
     "script-src 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
 

@@ -1,5 +1,7 @@
 """Gateway service: HTTP in, questions over the bus out."""
 
+import signal
+
 import uvicorn
 
 from medor_gateway.app import create_app
@@ -14,6 +16,8 @@ def main(config: Config) -> None:
             f"refusing to listen on {config.host} without API keys: set MEDOR_GATEWAY__KEYS=KEY=read+plan+robot:move "
             "(several separated by commas), or listen on 127.0.0.1"
         )
+    # uvicorn leaves on SIGTERM and then raises it again, which must not end the process before it has left the bus.
+    signal.signal(signal.SIGTERM, lambda *_: None)
     with join("gateway", config.bus) as bus:
         app = create_app(bus, config)
         bus.ready()
