@@ -15,7 +15,7 @@ from medor_wire.messages import (
     ResetRequest,
 )
 
-FLATTEN = EpisodeRequest(method="oracle", max_picks=2, candidates=10, seed=3, reset=ResetRequest())
+FLATTEN = EpisodeRequest(method="oracle", max_picks=2, candidates=6, seed=3, reset=ResetRequest())
 PLAN = PlanRequest(category="tshirt", method="oracle", candidates=8)
 
 

@@ -8,7 +8,7 @@ from medor_wire import endpoints
 from medor_wire.errors import BadRequest, Cancelled, Unavailable
 from medor_wire.messages import Plan, PlanProgress, PlanRequest
 
-ORACLE = PlanRequest(category="tshirt", method="oracle", candidates=24, seed=5)
+ORACLE = PlanRequest(category="tshirt", method="oracle", candidates=12, seed=5)
 
 
 def action(plan: Plan) -> list[float]:
@@ -27,7 +27,7 @@ def test_a_folded_sleeve_is_pulled_open(lab):
 
 
 def test_the_best_candidates_come_best_first_and_the_plan_is_the_first(lab):
-    plan = lab.bus.ask(endpoints.PLAN, ORACLE)
+    plan = lab.bus.ask(endpoints.PLAN, ORACLE.model_copy(update={"candidates": 24}))
     assert (np.diff(plan.top_rewards) <= 0).all()
     assert len(plan.top_picks) == 20
     assert plan.candidates == 24

@@ -21,7 +21,7 @@ from medor_wire.messages import Message, RolloutProgress, RolloutRequest
 
 log = logging.getLogger(__name__)
 
-CHUNK = 20
+CHUNK = 10
 """Candidates per request: the work lost with an instance, small against a plan, large against a request."""
 FAILURES = 3
 """An instance that fails so often in a row is not asked again in this plan; one that is only busy is."""
@@ -107,7 +107,8 @@ class Shooting:
                 self._finish(index, self._ask(instance, index))
                 failures = 0
             except (Unavailable, Cancelled) as lost:  # a process that leaves cancels what it runs
-                log.warning("chunk %d of %d goes back: %s: %s", index, len(self._chunks), instance.id, lost)
+                if not self._stop.is_set():
+                    log.warning("chunk %d of %d goes back: %s: %s", index, len(self._chunks), instance.id, lost)
                 failures += not isinstance(lost, Busy)
                 self._give_back(index)
                 if instance not in self._bus.instances(instance.service):
