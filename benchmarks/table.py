@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.results import Line
+from medor_cloth.improvement import carried_forward, quartiles
 
 AT_PICKS = (1, 2, 3, 5, 10)
 Group = tuple[str, str, str]
@@ -14,10 +15,9 @@ Group = tuple[str, str, str]
 
 
 def curves(lines: Sequence[Line], picks: int) -> dict[Group, NDArray[np.float64]]:
-    """NI after pick 1..picks of every episode, (episodes, picks), by group.
+    """NI after 0..picks picks of every episode, (episodes, picks + 1), by group.
 
-    An episode that ended early keeps its last value; values are clipped at 1 here, in aggregation only
-    (MEDOR, experiments).
+    An episode that ended early keeps its last value.
     """
     episodes: dict[str, list[Line]] = defaultdict(list)
     for line in lines:
@@ -25,8 +25,7 @@ def curves(lines: Sequence[Line], picks: int) -> dict[Group, NDArray[np.float64]
     groups: dict[Group, list[NDArray[np.float64]]] = defaultdict(list)
     for steps in episodes.values():
         by_pick = sorted(steps, key=lambda line: line["pick"])
-        ni = np.array([line["ni"] for line in by_pick])
-        filled = np.minimum(ni[np.minimum(np.arange(1, picks + 1), len(ni) - 1)], 1.0)
+        filled = carried_forward([line["ni"] for line in by_pick], picks)
         method, task, category = (by_pick[0][name] for name in ("method", "task", "category"))
         groups[method, task, category].append(filled)
         groups[method, task, "all"].append(filled)
@@ -44,7 +43,7 @@ def markdown(lines: Sequence[Line], picks: int) -> str:
     for group, values in sorted(curves(lines, picks).items(), key=_order):
         cells = []
         for p in at:
-            q25, median, q75 = np.percentile(values[:, p - 1], [25, 50, 75])
+            q25, median, q75 = quartiles(values[:, p])
             cells.append(f"{median:.2f} ({q25:.2f} to {q75:.2f})")
         rows.append(f"| {' | '.join(group)} | {len(values)} | {' | '.join(cells)} | {seconds[group]:.1f} |")
     return "\n".join(rows)
