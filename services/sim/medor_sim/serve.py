@@ -37,7 +37,7 @@ def serve(bus: Bus, simulator: Simulator, motion: Motion) -> None:
 
 def warm_up() -> None:
     """Compile what resets, actions and views need, on a garment that never comes onto the table."""
-    scene = Scene.begin(Wardrobe(1).generated("skirt", 0), "flat", 0)
+    scene = Scene.begin(Wardrobe(1).generated("tshirt", 0), "flat", 0)
     after = scene.pulled(scene.cloth.positions[0], np.array([0.0, 0.0, 0.1]), lambda: None).scene
     after.score()
     after.truth(overhead())
