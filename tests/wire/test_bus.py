@@ -270,6 +270,15 @@ def test_what_is_cancelled_in_the_queue_is_never_begun(join: Join) -> None:
     assert gate.entered == 1
 
 
+def test_what_is_cancelled_beforehand_is_not_sent(join: Join) -> None:
+    gate, cancel = Gate(), threading.Event()
+    cancel.set()
+    serve(join("server"), endpoints.STATUS, gate)
+    with pytest.raises(Cancelled, match="before it was sent"):
+        join("asker").ask(endpoints.STATUS, Empty(), cancel=cancel)
+    assert gate.entered == 0
+
+
 def test_an_action_that_ends_in_spite_of_the_cancel_reports_its_outcome(join: Join) -> None:
     exchange, begun, cancel = examples.EXCHANGES[endpoints.ACT], threading.Event(), threading.Event()
 
@@ -515,6 +524,19 @@ def test_a_server_that_leaves_hands_its_queue_back(join: Join) -> None:
         thread.join(3)
         assert result == [STATUS]
     assert gate.entered == 1
+
+
+def test_a_presence_callback_that_fails_is_called_again(join: Join) -> None:
+    seen: list[Instance] = []
+
+    def fails(instance: Instance, alive: bool) -> None:
+        seen.append(instance)
+        raise ZeroDivisionError
+
+    join("watcher").on_presence(fails)
+    for name in ("one", "two"):
+        serve(join(name), endpoints.STATUS, lambda request, call: STATUS)
+    eventually(lambda: len(seen) == 2)
 
 
 # --- streams ------------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from medor_wire.asking import Waiter
 from medor_wire.bus import Call, Health, Instance, Subscription
 from medor_wire.endpoints import Endpoint, Topic
 from medor_wire.envelope import Envelope
-from medor_wire.errors import BadFrame, Timeout, Unavailable
+from medor_wire.errors import BadFrame, Cancelled, Timeout, Unavailable
 from medor_wire.messages import Heartbeat, Message
 from medor_wire.metrics import Metrics
 from medor_wire.peers import Peers
@@ -36,7 +36,7 @@ GRACE_S = 1.0
 BEAT_S = 1.0
 FORGET_S = 60.0
 """A process not heard of for this long leaves the health table."""
-LEAVE_S = 2.0
+LEAVE_S = 1.0
 """How long handlers get to notice that the process is leaving."""
 
 
@@ -118,6 +118,8 @@ class Member:
         on_progress: Callable[[Message], None] | None,
         cancel: threading.Event | None,
     ) -> Reply:
+        if cancel is not None and cancel.is_set():
+            raise Cancelled(f"{endpoint.name} was cancelled before it was sent")
         left = deadline - time.monotonic()
         if left <= 0:
             raise Timeout(f"no time left to ask {endpoint.name}")

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Collection
 from queue import SimpleQueue
 
+from medor_wire import logs
 from medor_wire.bus import Instance
 from medor_wire.errors import Unavailable
 
@@ -80,4 +81,7 @@ class Peers:
     def _tell(self) -> None:
         while (event := self._events.get()) is not None:
             callback, instance, alive = event
-            callback(instance, alive)
+            try:
+                callback(instance, alive)
+            except Exception:
+                logs.defect("presence", instance.presence)

@@ -16,7 +16,7 @@ from medor_wire.messages import Message
 from medor_wire.transport import Incoming
 
 Observe = Callable[[str, str, float, str], None]
-"""endpoint, request id, seconds in the service, outcome (`ok` or an error code)."""
+"""endpoint, request id, seconds in the service, outcome (`ok`, an error code, or `unsent`)."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,11 @@ class Server:
 
     def _work(self) -> None:
         while (job := self._queue.get()) is not None:
-            outcome = self._answer(job)
+            try:
+                outcome = self._answer(job)
+            except Exception:  # the link is gone: there is nobody to tell, and other requests to answer
+                self._defect(self.endpoint.name, job.call.request_id)
+                outcome = "unsent"
             self._observe(self.endpoint.name, job.call.request_id, time.monotonic() - job.arrived, outcome)
 
     def _answer(self, job: _Job) -> str:
