@@ -74,7 +74,7 @@ def requires(scope: Scope | None) -> Dependency:
     from elsewhere, which a browser on this machine may show, may not.
     """
 
-    def check(
+    async def check(  # not `def`: that would take a thread of the pool, and a stop must not wait for one
         request: Request,
         bearer: Annotated[HTTPAuthorizationCredentials | None, Depends(BEARER)],
         api_key: Annotated[str | None, Depends(API_KEY)],

@@ -49,7 +49,7 @@ class Door:
         self.episodes.close()
 
 
-def _door(request: Request) -> Door:
+async def _door(request: Request) -> Door:
     return request.app.state.door
 
 
