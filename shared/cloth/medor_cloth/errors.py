@@ -2,7 +2,8 @@
 
 ClothError
 ├── MeshError       a mesh that cannot be cloth: what was found and what is needed
-└── GarmentError    a garment that cannot be made: unknown category, no valid shape for this seed
+├── GarmentError    a garment that cannot be made: unknown category, no valid shape for this seed
+└── DatasetError    a data set on disk that is not one: shards that do not belong together
 """
 
 
@@ -16,3 +17,7 @@ class MeshError(ClothError):
 
 class GarmentError(ClothError):
     """A garment that cannot be generated."""
+
+
+class DatasetError(ClothError):
+    """Files that are not one data set."""

@@ -3,12 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
 from medor_cloth.camera import Camera
 from medor_cloth.picker import SETTLED_SPEED
 from medor_cloth.raster import Raster
 from medor_cloth.solver import ClothState, Solver
-from numpy.typing import NDArray
-
 from medor_sim.collect.harris import harris_corners
 
 CORNER_SHARE = 0.9

@@ -25,7 +25,7 @@ def harris_corners(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Pixels (H, W) of a mask about its corners."""
     response = harris_response(mask)
     corners = response > THRESHOLD * response.max()
-    return binary_dilation(corners, np.ones((DILATION_PX, DILATION_PX))) & mask
+    return np.logical_and(binary_dilation(corners, np.ones((DILATION_PX, DILATION_PX))), mask)
 
 
 def _sobel(image: NDArray[np.float64], axis: int) -> NDArray[np.float64]:

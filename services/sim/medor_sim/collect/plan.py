@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
+
 from medor_cloth.dataset import SPLITS, box_of
 from medor_cloth.errors import GarmentError
 from medor_cloth.garment import CATEGORIES, GENERATOR_VERSION, Garment, generate

@@ -1,0 +1,163 @@
+"""Collect data sets of crumpled garments, look at them, turn them into other formats."""
+
+import os
+import re
+import signal
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from rich.console import Console
+
+from medor_cloth.dataset import Dataset
+from medor_cloth.errors import ClothError, DatasetError
+from medor_sim.collect import export as exporting
+from medor_sim.collect import show as showing
+from medor_sim.collect.contact_sheet import write_contact_sheet
+from medor_sim.collect.plan import Plan
+from medor_sim.collect.progress import CollectionProgress
+from medor_sim.collect.shard import Shard
+from medor_sim.collect.workers import collect_in_processes
+from medor_wire.messages import Category
+
+CONSOLE = Console(stderr=True)
+
+
+def recon(
+    category: Category,
+    n: int,
+    out: Path,
+    shard: str = "0/1",
+    seed: int = 0,
+    split: Literal["train", "test"] = "train",
+    per_garment: int = 10,
+    edge_m: float = 0.012,
+    winding: int = 64,
+    workers: int = 0,
+    preview: bool = False,
+) -> None:
+    """Trajectories of five observations of a garment that is picked at.
+
+    The same command goes on where it was stopped.
+
+    Args:
+        category: of the garments.
+        n: trajectories over all shards, five observations each.
+        out: folder of the data set.
+        shard: i/N, one of 0/N … N-1/N; the data does not depend on N.
+        seed: another one gives other garments and other chances.
+        split: garments for training (seeds below 800000) or for tests (800000 to 899999).
+        per_garment: trajectories of each garment.
+        edge_m: mean edge length of the meshes [m].
+        winding: nodes along each side of the winding-number grids; 0 stores none.
+        workers: processes; 0 means one per core.
+        preview: write a picture of some trajectories beside the shard.
+    """
+    _collect(Plan("recon", category, n, seed, split, per_garment, edge_m, winding), out, shard, workers, preview)
+
+
+def dynamics(
+    category: Category,
+    n: int,
+    out: Path,
+    shard: str = "0/1",
+    seed: int = 0,
+    split: Literal["train", "test"] = "train",
+    per_garment: int = 10,
+    edge_m: float = 0.012,
+    workers: int = 0,
+    preview: bool = False,
+) -> None:
+    """Trajectories of one pull and the fall after it, every fifth frame.
+
+    The same command goes on where it was stopped.
+
+    Args:
+        category: of the garments.
+        n: trajectories over all shards.
+        out: folder of the data set.
+        shard: i/N, one of 0/N … N-1/N; the data does not depend on N.
+        seed: another one gives other garments and other chances.
+        split: garments for training (seeds below 800000) or for tests (800000 to 899999).
+        per_garment: trajectories of each garment, two from each start state.
+        edge_m: mean edge length of the meshes [m].
+        workers: processes; 0 means one per core.
+        preview: write a picture of some trajectories beside the shard.
+    """
+    _collect(Plan("dynamics", category, n, seed, split, per_garment, edge_m), out, shard, workers, preview)
+
+
+def export(
+    folder: tyro.conf.Positional[Path],
+    out: Path,
+    form: Annotated[Literal["npz", "ply"], tyro.conf.arg(name="format")] = "npz",
+    first: int = 0,
+    count: int | None = None,
+) -> None:
+    """Write trajectories as .npz (one file each, all arrays) or .ply (one file a state, coloured by NOCS).
+
+    Args:
+        folder: the data set, or one shard.
+        out: folder for the files.
+        form: of the files.
+        first: index of the first trajectory.
+        count: how many; all that follow when left out.
+    """
+    CONSOLE.print(f"{exporting.export(folder, out, form, first, count)} trajectories in {out}")
+
+
+def show(folder: tyro.conf.Positional[Path], out: Path, index: int = 0) -> None:
+    """Write one trajectory as a moving picture (.gif) or a strip of pictures (.png).
+
+    Args:
+        folder: the data set, or one shard.
+        out: file to write.
+        index: of the trajectory.
+    """
+    showing.show(folder, index, out)
+
+
+def preview(folder: tyro.conf.Positional[Path], out: Path, trajectories: int = 4) -> None:
+    """Write a contact sheet of some trajectories.
+
+    Args:
+        folder: the data set, or one shard.
+        out: PNG file to write.
+        trajectories: how many, spread over the data set.
+    """
+    write_contact_sheet(folder, out, trajectories)
+
+
+def _collect(plan: Plan, out: Path, shard: str, workers: int, preview: bool) -> None:
+    mine = Shard(plan, *parse_shard(shard), out)
+    with mine.opened():
+        with CollectionProgress(mine.total, mine.found, CONSOLE) as progress:
+            cores = workers or len(os.sched_getaffinity(0))
+            collect_in_processes(mine, mine.garments, cores, progress.written_one)
+        CONSOLE.print(f"{len(Dataset(mine.path))} trajectories in {mine.path}", soft_wrap=True)
+    if preview:
+        write_contact_sheet(mine.path, mine.path.with_suffix(".png"))
+
+
+def parse_shard(text: str) -> tuple[int, int]:
+    """(index, count) of a shard written as i/N, counted from 0."""
+    match = re.fullmatch(r"(\d+)/(\d+)", text)
+    if not match or int(match[1]) >= int(match[2]):
+        raise DatasetError(f"expected --shard i/N with 0 <= i < N, got {text!r}")
+    return int(match[1]), int(match[2])
+
+
+def main() -> None:
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the workers as Ctrl-C does
+    commands = {"recon": recon, "dynamics": dynamics, "preview": preview, "show": show, "export": export}
+    try:
+        tyro.extras.subcommand_cli_from_dict(commands, prog="medor_sim.collect", description=__doc__)
+    except (ClothError, ValueError) as error:
+        sys.exit(f"collect: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()
