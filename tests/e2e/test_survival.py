@@ -80,7 +80,7 @@ def test_a_lost_door_opens_again(cell: Launcher, door: httpx.Client) -> None:
 
 def test_losing_a_replica_in_the_middle_of_a_plan_changes_nothing(cell: Launcher, door: httpx.Client) -> None:
     door.post("/cell/reset", json=GARMENT).raise_for_status()
-    request = PlanRequest(category="skirt", method="oracle", candidates=32, seed=5)
+    request = PlanRequest(category="skirt", method="oracle", candidates=30, seed=5)
     whole = cell.bus.ask(endpoints.PLAN, request)
     rolling = threading.Event()
 

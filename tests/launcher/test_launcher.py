@@ -70,6 +70,20 @@ def test_a_taken_port_is_refused_with_what_to_do(cell_file: Path) -> None:
             Launcher(router_port=port, file=cell_file)
 
 
+def test_state_is_private_to_the_cell_and_gone_with_it(tmp_path: Path) -> None:
+    ledger = "environment: {LEDGER: '${MEDOR_STATE:-runs}/ledger'}"
+    keeper = f"services: {{eye: {{command: [python, fake.py], profiles: [sim], {ledger}}}}}"
+    file = write_cell(tmp_path, keeper, "import os; open(os.environ['LEDGER'], 'x'); print(os.environ['LEDGER'])")
+    kept = []
+    for _ in range(2):
+        with Launcher(file=file, echo=False) as cell:
+            eventually(lambda cell=cell: cell.processes["eye"].tail)
+            kept.append(Path(cell.processes["eye"].tail[0]))
+            assert kept[-1].exists()
+    assert kept[0] != kept[1]
+    assert not any(path.parent.exists() for path in kept)
+
+
 def test_free_ports_are_free() -> None:
     with socket.create_server(("127.0.0.1", free_port())):
         pass

@@ -7,6 +7,7 @@ with Launcher(profile="sim") as cell:
 
 import http.client
 import os
+import shutil
 import socket
 import sys
 import time
@@ -14,12 +15,12 @@ import urllib.request
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import gettempdir
 from typing import Self
 
 from medor_wire import compose
 from medor_wire.bus import Bus, join
-from medor_wire.config import BusConfig
+from medor_wire.config import Settings
 from medor_wire.output import Output
 from medor_wire.router import routing
 from medor_wire.supervisor import Process, Supervisor, describe
@@ -81,8 +82,11 @@ class Launcher:
         require_free(self.port, "--port")
         require_free(int(self.router.rpartition(":")[2]), "--router-port")
         given = {**os.environ, **(environment or {})}
-        self._state = TemporaryDirectory(prefix="medor-", ignore_cleanup_errors=True)
-        services = compose.read(file, {**given, "MEDOR_STATE": self._state.name})
+        addresses = {"router": self.router, "id": "", "metrics_port": 0}
+        self._config = Settings.from_environment(given).bus.model_copy(update=addresses)
+        # What this cell's processes remember between their restarts, and no other cell shares.
+        self._state = Path(gettempdir()) / f"medor-{os.getpid()}-{self.port}"
+        services = compose.read(file, {**given, "MEDOR_STATE": str(self._state)})
         self.output = Output(file.parent / logs, echo=echo)
         self._supervisor = Supervisor(
             [
@@ -99,6 +103,7 @@ class Launcher:
         addresses = {
             "MEDOR_BUS__ROUTER": self.router,
             "MEDOR_BUS__ID": replica.name,
+            "MEDOR_BUS__METRICS_PORT": "0",
             "MEDOR_GATEWAY__HOST": LOOPBACK,
             "MEDOR_GATEWAY__PORT": str(self.port),
             "PYTHONUNBUFFERED": "1",
@@ -111,10 +116,11 @@ class Launcher:
     def start(self) -> Self:
         """Starts the router and every process; does not wait for them."""
         with ExitStack() as opened:
-            opened.enter_context(self._state)
+            self._state.mkdir(mode=0o700)
+            opened.callback(shutil.rmtree, self._state, ignore_errors=True)
             opened.enter_context(self.output)
-            opened.enter_context(routing(self.router))
-            self.bus = opened.enter_context(join("launcher", BusConfig(router=self.router)))
+            opened.enter_context(routing(self.router, self._config))
+            self.bus = opened.enter_context(join("launcher", self._config))
             self._supervisor.start()
             opened.callback(self._supervisor.stop)
             self._open = opened.pop_all()

@@ -42,6 +42,7 @@ def routing(listen: str, bus: BusConfig | None = None) -> Iterator[None]:
 def main(config: Config) -> None:
     """Route until SIGTERM or SIGINT; a member of the bus itself, so that its health shows like everyone's."""
     with routing(config.listen, config.bus), join("router", config.bus) as bus:
+        bus.ready()
         bus.run()
 
 
