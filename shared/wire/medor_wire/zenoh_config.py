@@ -10,6 +10,7 @@ from typing import Any
 
 import zenoh
 
+from medor_wire.access import access_control, command_limit
 from medor_wire.config import BusConfig
 
 LEASE_MS = 2000
@@ -35,7 +36,11 @@ def client_config(config: BusConfig) -> zenoh.Config:
 
 
 def router_config(listen: str, *, shared_memory: bool = True, tls: Path | None = None) -> zenoh.Config:
-    """A router listening on `listen` alone, e.g. `tcp/127.0.0.1:7447`; `zenoh.open` of it hosts the router."""
+    """A router listening on `listen` alone, e.g. `tcp/127.0.0.1:7447`; `zenoh.open` of it hosts the router.
+
+    With certificates it lets every peer do only what `access` says.
+    """
+    secured = {"access_control": access_control()} if tls is not None else {}
     return _locked(
         {
             "mode": "router",
@@ -45,7 +50,9 @@ def router_config(listen: str, *, shared_memory: bool = True, tls: Path | None =
             # Without it 150 idle connections lock new clients out for 10 s.
             "transport/unicast/accept_timeout": LEASE_MS,
             "transport/unicast/max_sessions": 64,
+            "low_pass_filter": command_limit(),
         }
+        | secured
         | _transport(listen, shared_memory, tls)
     )
 
