@@ -15,8 +15,6 @@ SETTLE_FRAMES = 100
 """Frames at normal gravity after the press."""
 SETTLED_SPEED = 0.02
 """Speed below which a flat cloth counts as settled [m/s]."""
-_SQUASHED_M = 0.04
-"""Front-to-back extent of a worn garment that is laid under the press [m]."""
 
 
 def solver_of(garment: Garment) -> Solver:
@@ -59,15 +57,30 @@ def centred(positions: NDArray[np.float32]) -> NDArray[np.float32]:
 def turned(garment: Garment, element: int, order: int) -> NDArray[np.float32]:
     """A layout (V,3) world frame [m] of the garment turned by element/order of a full turn about its body axis.
 
-    The flat layout serves for whole and half turns, lying on its front for the latter. In between the worn shape is
-    turned, squashed from front to back and left to the press.
+    The flat layout is taken for a flattened cone, which a skirt is: its layers are sectors about the apex where the
+    side seams meet, and a turn moves each vertex around the apex, over the fold at the seam and on to the other layer.
     """
+    layout = garment.laid_flat()
     if element == 0:
-        return garment.laid_flat()
+        return layout
     if 2 * element == order:
-        return garment.laid_flat() * np.array([-1, 1, -1], np.float32) + np.array([0, 0, 0.02], np.float32)
-    angle = 2 * np.pi * element / order
-    x, y, z = garment.vertices.astype(np.float64).T
-    side, back = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
-    height = (back.max() - back) * _SQUASHED_M / np.ptp(back)
-    return np.stack([side, z, height], 1).astype(np.float32)
+        return layout * np.float32([-1, 1, -1]) + np.float32([0, 0, np.ptp(layout[:, 2])])
+    x, y, z = layout.astype(np.float64).T
+    apex = _apex(x, y)
+    radius, angle = np.hypot(x, apex - y), np.arctan2(x, apex - y)
+    widest = np.abs(angle).max()
+    front = z > (z.min() + z.max()) / 2
+    around = np.where(front, 1 + angle / widest, 3 - angle / widest) / 4  # front left to right, then back to left
+    around = (around + element / order) % 1
+    angle = widest * np.where(around < 0.5, 4 * around - 1, 3 - 4 * around)
+    height = np.where(around < 0.5, z.max(), z.min())
+    return np.stack([radius * np.sin(angle), apex - radius * np.cos(angle), height], 1).astype(np.float32)
+
+
+def _apex(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Where above the body axis the sides of a flat layout would meet [m]; far off for straight sides."""
+    bands = np.linspace(y.min(), y.max(), 7)
+    band = np.clip(np.digitize(y, bands) - 1, 0, 5)
+    ends = [np.flatnonzero(band == k)[np.abs(x[band == k]).argmax()] for k in range(6) if (band == k).any()]
+    slope, width = np.polyfit(y[ends], np.abs(x[ends]), 1)
+    return float(-width / min(slope, -1e-3))

@@ -113,8 +113,8 @@ def simulate(x, v, picker, path, holding, held, calm, topology: Topology, physic
         if held >= 0:
             inverse_mass[held] = _ONE
         picker[:] = path[frame]
-        calm = calm + 1 if _is_slow(v, physics.settle_speed) else 0
-        if calm >= CALM_FRAMES and physics.settle_speed > _ZERO:
+        calm = calm + 1 if physics.settle_speed > _ZERO and _is_slow(v, physics.settle_speed) else 0
+        if calm >= CALM_FRAMES:
             return frame + 1, held, calm
     return len(path), held, calm
 

@@ -72,8 +72,8 @@ def pick_place(
         state: Where the cloth is now; not modified.
         pick: Centre of the picker where it closes (3,) world frame [m].
         place: Centre of the picker where it opens (3,) world frame [m].
-        settle_frames: Longest time given to settle after the release.
-        record_every: Record the positions every so many frames; 0 for not at all.
+        settle_frames: Longest time given to settle after the release; it ends once the cloth has settled.
+        record_every: Record the positions every so many frames, and the last ones; 0 for not at all.
     """
     now = solver.placed(state, pick)
     path, holding = pull(pick, place), np.ones(PULL_FRAMES, bool)
@@ -89,6 +89,8 @@ def pick_place(
     for begin in range(0, settle_frames, stride):
         now = solver.advance(now, min(stride, settle_frames - begin), settle_speed=SETTLED_SPEED)
         frames.append(now.positions)
+        if now.settled:
+            break
     recorded = np.stack(frames) if record_every else np.empty((0, *now.positions.shape), np.float32)
     return Outcome(now, grasped, recorded)
 

@@ -13,7 +13,10 @@ from numba import njit
 
 _HALF, _ONE, _ZERO, _TINY = np.float32(0.5), np.float32(1), np.float32(0), np.float32(1e-16)
 _MAX_CELLS = 1 << 15
-ZR = np.float32(0.05)
+_LOW = np.float32(0.3)
+"""Width of a cell over its height: piles are low, so a cell holds most of the layers over a place."""
+_TILT = np.float32(0.3)
+"""Sine of the angle by which a triangle may turn before its points are listed anew."""
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -46,8 +49,10 @@ def find_neighbours(x, margin, faces, across, points, thickness, cell, near):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         own = max(margin[a], margin[b], margin[c])
         nx, ny, nz, _ = _normal(x, a, b, c)
-        # A touching point lies over the triangle: it is off by the thickness along the normal only.
-        rx, ry, rz = (own + thickness * abs(nx), own + thickness * abs(ny), own + thickness * abs(nz))
+        # A touching point lies over the triangle: it is off by the thickness along the normal, which may tilt.
+        rx = own + thickness * max(abs(nx), _TILT)
+        ry = own + thickness * max(abs(ny), _TILT)
+        rz = own + thickness * max(abs(nz), _TILT)
         lx, hx = min(x[a, 0], x[b, 0], x[c, 0]) - rx, max(x[a, 0], x[b, 0], x[c, 0]) + rx
         ly, hy = min(x[a, 1], x[b, 1], x[c, 1]) - ry, max(x[a, 1], x[b, 1], x[c, 1]) + ry
         lz, hz = min(x[a, 2], x[b, 2], x[c, 2]) - rz, max(x[a, 2], x[b, 2], x[c, 2]) + rz
@@ -152,7 +157,8 @@ def _measure(x, a, b, c, px, py, pz, reach, chosen, thickness, own, gap):
         beyond_c, beyond_b = gx * cx + gy * cy + gz * cz, gx * bx + gy * by + gz * bz
         beyond_a = -(sc * beyond_c + sb * beyond_b) - height
         above = abs(gx * nx + gy * ny + gz * nz) - thickness
-        gap[k] = max(max(above, beyond_a), max(beyond_b, beyond_c)) - own - reach[q]
+        beyond = max(beyond_a, max(beyond_b, beyond_c)) - thickness * _TILT
+        gap[k] = max(above, beyond) - own - reach[q]
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -175,11 +181,12 @@ def _sort_into_grid(x, margin, points, cell):
     """
     low = (x[:, 0].min(), x[:, 1].min(), x[:, 2].min())
     extent = (x[:, 0].max() - low[0], x[:, 1].max() - low[1], x[:, 2].max() - low[2])
-    inverse, inverse_z = _ONE / cell, ZR / cell
-    while (extent[0] * inverse + _ONE) * (extent[1] * inverse + _ONE) * (extent[2] * inverse + _ONE) > _MAX_CELLS:
+    inverse, inverse_z = _ONE / cell, _LOW / cell
+    while (extent[0] * inverse + 2) * (extent[1] * inverse + 2) * (extent[2] * inverse_z + 2) > _MAX_CELLS:
         inverse *= np.float32(0.8)
         inverse_z *= np.float32(0.8)
-    counts = (int(extent[0] * inverse) + 1, int(extent[1] * inverse) + 1, int(extent[2] * inverse_z) + 1)
+    # One cell to spare: rounding may put the outermost point past the last.
+    counts = (int(extent[0] * inverse) + 2, int(extent[1] * inverse) + 2, int(extent[2] * inverse_z) + 2)
     ends = np.zeros(counts[0] * counts[1] * counts[2] + 1, np.int32)
     keys = np.empty(len(points), np.int32)
     for p in range(len(points)):

@@ -55,6 +55,11 @@ class ClothState:
     frame: int
     calm: int
 
+    @property
+    def settled(self) -> bool:
+        """Whether the cloth was slow for long enough to count as settled."""
+        return self.calm >= CALM_FRAMES
+
     def copy(self) -> "ClothState":
         """A state that shares no memory with this one."""
         return replace(
@@ -157,11 +162,6 @@ class Solver:
         )
         now.frame += done
         return now
-
-
-def settled(state: ClothState) -> bool:
-    """Whether the last `advance` stopped because the cloth had settled."""
-    return state.calm >= CALM_FRAMES
 
 
 def _physics(config: SolverConfig, edge: float) -> Physics:

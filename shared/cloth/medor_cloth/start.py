@@ -27,7 +27,9 @@ VIEW_M = 0.25
 _PICK_LENGTH_M = (0.05, 0.2)
 
 
-def dropped(solver: Solver, flat: ClothState, rng: np.random.Generator, max_coverage: float = 0.7) -> ClothState:
+def dropped(
+    solver: Solver, flat: ClothState, rng: np.random.Generator, max_coverage: float = 0.7, tries: int = MAX_TRIES
+) -> ClothState:
     """The cloth after it was lifted at a vertex drawn at random and let go, at rest under the camera.
 
     Drawn again until it covers less than a share of the flat cloth.
@@ -37,16 +39,17 @@ def dropped(solver: Solver, flat: ClothState, rng: np.random.Generator, max_cove
         flat: The flattened cloth.
         rng: Source of chance.
         max_coverage: Largest coverage accepted, as a share of the flat one.
+        tries: Number of draws before giving up.
 
     Raises:
         ClothError: If no draw is crumpled enough.
     """
     limit = max_coverage * coverage(flat.positions, solver.cloth.faces)
-    for _ in range(MAX_TRIES):
+    for _ in range(tries):
         state = _lift_and_drop(solver, flat, rng)
         if coverage(state.positions, solver.cloth.faces) < limit:
             return state
-    raise ClothError(f"none of {MAX_TRIES} drops covered less than {max_coverage:.0%} of the flat cloth")
+    raise ClothError(f"none of {tries} drops covered less than {max_coverage:.0%} of the flat cloth")
 
 
 def picked(solver: Solver, flat: ClothState, rng: np.random.Generator, picks: int = 5) -> ClothState:
