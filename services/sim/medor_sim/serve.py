@@ -1,5 +1,6 @@
 """Simulated cell: serves the robot's endpoints and, beside them, what only a simulation can know or do."""
 
+from contextlib import closing
 from pathlib import Path
 from typing import Literal
 
@@ -48,10 +49,11 @@ def main(config: Config) -> None:
     motion = Motion(ledger, Lessor(ledger))
     with join("sim", config.bus) as bus:
         bus.ready(False, "warming up")
-        serve(bus, Simulator(motion, Wardrobe(config.garments), bus.publish), motion)
-        warm_up()
-        bus.ready()
-        bus.run()
+        with closing(Simulator(motion, Wardrobe(config.garments), bus.publish)) as simulator:
+            serve(bus, simulator, motion)
+            warm_up()
+            bus.ready()
+            bus.run()
     ledger.close()
 
 

@@ -30,10 +30,5 @@ class World:
         shape = self._client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=TABLE_HALF_SIZE_M)
         self._client.createMultiBody(0, shape, basePosition=(0, 0, -TABLE_HALF_SIZE_M[2]))
 
-    def height_at(self, x: float, y: float) -> float:
-        """Height [m] of the first rigid surface under a point of the table plane, seen from above."""
-        hit = self._client.rayTest((x, y, 2.0), (x, y, -2.0))[0]
-        return float(hit[3][2]) if hit[0] >= 0 else float("-inf")
-
     def close(self) -> None:
         self._client.disconnect()
