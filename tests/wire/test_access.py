@@ -82,13 +82,13 @@ class Cell:
     def __init__(self, bus: ZenohBus) -> None:
         self.seen: list[str] = []
         self.cancelled = threading.Event()
-        served: tuple[Endpoint[Any, Any], ...] = (
+        served: list[Endpoint[Any, Any]] = [
             endpoints.STATUS,
             endpoints.LEASE,
             endpoints.ACT,
             endpoints.CLEAR_STOP,
             endpoints.SCORE,
-        )
+        ]
         for endpoint in served:
             bus.serve(endpoint, self._handler(endpoint))
         bus.serve(endpoints.CAPTURE, self._hang)

@@ -224,6 +224,7 @@ def hang(request, call):
     time.sleep(600)
 with join("status", BusConfig(router=sys.argv[1], cell=sys.argv[2])) as bus:
     bus.serve(endpoints.STATUS, hang)
+    bus.subscribe(endpoints.CELL, print)
     bus.run()
 print("left")
 """
@@ -251,7 +252,10 @@ def test_a_server_leaves_when_told_even_with_a_stuck_handler(
 
 def test_a_session_that_nobody_closed_does_not_keep_a_process(cell_config: BusConfig) -> None:
     code = "import sys; from medor_wire.zenoh_bus import ZenohBus; from medor_wire.config import BusConfig; "
-    code += "bus = ZenohBus('a', BusConfig(router=sys.argv[1], cell=sys.argv[2])); bus.ready()"
+    code += "from medor_wire.endpoints import CELL; "
+    code += (
+        "bus = ZenohBus('a', BusConfig(router=sys.argv[1], cell=sys.argv[2])); bus.ready(); bus.subscribe(CELL, print)"
+    )
     run = subprocess.run(
         [sys.executable, "-c", code, cell_config.router, cell_config.cell], timeout=15, capture_output=True, check=False
     )

@@ -1,5 +1,6 @@
 """One process on a bus, whatever the transport: asks with retries, serves, beats, leaves cleanly."""
 
+import atexit
 import contextlib
 import random
 import secrets
@@ -61,6 +62,8 @@ class Member:
         self._heart: threading.Thread | None = None
         transport.on_presence(self._peers.update)
         transport.on_heartbeat(self._heard)
+        # An interpreter that shuts down around an open session aborts or hangs.
+        atexit.register(self.close)
 
     # --- asking ---------------------------------------------------------------------------------------------------
 
@@ -248,6 +251,7 @@ class Member:
         if self._heart is not None and self._heart is not threading.current_thread():
             self._heart.join(BEAT_S)
         self._transport.close()
+        atexit.unregister(self.close)
         self._peers.close()
         self.metrics.close()
 

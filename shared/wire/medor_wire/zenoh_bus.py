@@ -27,6 +27,7 @@ __all__ = ["ZenohBus", "ZenohTransport", "join"]
 FRAME = zenoh.Encoding("application/vnd.medor.frame")
 ERROR = zenoh.Encoding("application/vnd.medor.error")
 PROGRESS = b"progress"
+JOIN_S = 1.0
 CLOSE_S = 3.0
 """Closing a session is known to hang at times; a process leaves all the same."""
 
@@ -77,6 +78,7 @@ class ZenohTransport:
         self._session = _open(config, patience_s)
         self._cell = f"medor/{config.cell}"
         self._tokens: dict[Instance, zenoh.LivelinessToken] = {}
+        self._watches: list[Watch] = []
         self._declared: list[object] = []
         """Queryables and subscribers live as long as they are referenced."""
 
@@ -156,7 +158,7 @@ class ZenohTransport:
 
     def subscribe(self, name: str, listener: Callable[[bytes], None]) -> "Watch":
         watch = Watch(self._session.declare_subscriber(f"{self._cell}/{name}", RingChannel(1)), name, listener)
-        self._declared.append(watch)
+        self._watches = [*(earlier for earlier in self._watches if earlier.alive), watch]
         return watch
 
     def on_heartbeat(self, listener: Callable[[bytes], None]) -> None:
@@ -168,6 +170,8 @@ class ZenohTransport:
         closing.join(CLOSE_S)
         if closing.is_alive():
             logs.logger("bus").warning("the session did not close", seconds=CLOSE_S)
+        for watch in self._watches:
+            watch.join()
 
     def _listen(self, key: str, listener: Callable[[zenoh.Sample], None]) -> None:
         self._declared.append(self._session.declare_subscriber(key, Callback(listener, indirect=False)))
@@ -188,11 +192,24 @@ class Watch:
     def __init__(self, subscriber: zenoh.Subscriber[Frames], name: str, listener: Callable[[bytes], None]) -> None:
         self._subscriber = subscriber
         frames = subscriber.handler
-        threading.Thread(target=self._deliver, args=(frames, listener), name=f"watch {name}", daemon=True).start()
+        self._thread = threading.Thread(
+            target=self._deliver, args=(frames, listener), name=f"watch {name}", daemon=True
+        )
+        self._thread.start()
 
     def close(self) -> None:
         with contextlib.suppress(zenoh.ZError):
             self._subscriber.undeclare()
+        self.join()
+
+    @property
+    def alive(self) -> bool:
+        return self._thread.is_alive()
+
+    def join(self) -> None:
+        """Wait for the thread to leave Zenoh: one that is inside it when the interpreter ends aborts the process."""
+        if self._thread is not threading.current_thread():
+            self._thread.join(JOIN_S)
 
     @staticmethod
     def _deliver(frames: Frames, listener: Callable[[bytes], None]) -> None:
