@@ -34,7 +34,8 @@ def end(process: subprocess.Popen[str], number: signal.Signals) -> float:
 def running(cell_file: Path) -> Iterator[tuple[subprocess.Popen[str], str, list[int]]]:
     """`medor up` that says it is ready, its bus address and the processes it started."""
     command = [*MEDOR, "up", "--port", "0", "--router-port", "0"]
-    with subprocess.Popen(command, cwd=cell_file.parent, stderr=subprocess.PIPE, text=True) as process:
+    environment = {**os.environ, "TMPDIR": str(cell_file.parent)}  # what a killed launcher cannot remove stays there
+    with subprocess.Popen(command, cwd=cell_file.parent, env=environment, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         for line in process.stderr:
             if ready := re.search(r"ready after .*\(bus (\S+)\)", line):
