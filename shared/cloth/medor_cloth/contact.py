@@ -3,14 +3,15 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from medor_cloth.kernel import kernel
 
 _ONE, _HALF, _QUARTER, _ZERO = np.float32(1), np.float32(0.5), np.float32(0.25), np.float32(0)
 _RIM = np.float32(-0.02)
 """How far outside a triangle, in barycentric weight, a point still counts as over it."""
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def part_layers(x, before, inverse_mass, faces, starts, near, thickness, friction, push_out):
     """Pushes every point closer than the thickness to a triangle back to the side it was on before this substep.
 
@@ -99,7 +100,7 @@ def part_layers(x, before, inverse_mass, faces, starts, near, thickness, frictio
             x[c, 0], x[c, 1], x[c, 2] = cx, cy, cz
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def rest_on_table(x, before, inverse_mass, height, friction):
     """Keeps every vertex at least `height` over the table plane z = 0 and holds it back by friction."""
     for i in range(len(x)):
@@ -112,7 +113,7 @@ def rest_on_table(x, before, inverse_mass, height, friction):
             x[i, 1] -= drag * wy
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def _side(before, a, b, c, i, j):
     """+1 if the midpoint of i and j was on the triangle's outer side, else -1."""
     ax, ay, az = before[a, 0], before[a, 1], before[a, 2]

@@ -4,11 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from medor_cloth.cloth import Springs
 from medor_cloth.contact import part_layers, rest_on_table
+from medor_cloth.kernel import kernel
 from medor_cloth.picker import nearest_within_reach
 from medor_cloth.proximity import expect, find_neighbours, n_astray
 from medor_cloth.springs import damp_springs, relax_springs
@@ -57,7 +57,7 @@ class Physics(NamedTuple):
     most_margin: np.float32
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def simulate(x, v, picker, path, holding, held, calm, topology: Topology, physics: Physics):
     """Moves the cloth through the frames of a picker path, or until it has settled.
 
@@ -119,7 +119,7 @@ def simulate(x, v, picker, path, holding, held, calm, topology: Topology, physic
     return len(path), held, calm
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def _predict(x, v, before, inverse_mass, physics: Physics):
     """Free flight of every vertex that is not held, no faster than the top speed."""
     step, keep = physics.step, _ONE - physics.drag * physics.step
@@ -136,7 +136,7 @@ def _predict(x, v, before, inverse_mass, physics: Physics):
             x[i, 2] += way * vz
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def _update_velocity(x, v, before, step):
     rate = _ONE / step
     for i in range(len(x)):
@@ -144,7 +144,7 @@ def _update_velocity(x, v, before, step):
             v[i, axis] = (x[i, axis] - before[i, axis]) * rate
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def _is_slow(v, speed):
     fast = 0
     for i in range(len(v)):
@@ -153,7 +153,7 @@ def _is_slow(v, speed):
     return fast * _CALM_SHARE <= len(v)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _longest(colours):
     longest = 0
     for c in range(len(colours) - 1):

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from medor_cloth.kernel import kernel
 
 if TYPE_CHECKING:
     from medor_cloth.solver import ClothState, Solver
@@ -95,7 +96,7 @@ def pick_place(
     return Outcome(now, grasped, recorded)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def nearest_within_reach(x, picker):
     """Index of the vertex of (V,3) nearest to the picker (3,) if within `REACH_M`, else -1."""
     best, nearest = np.float32(REACH_M * REACH_M), -1

@@ -9,17 +9,18 @@ cloth is short.
 import math
 
 import numpy as np
-from numba import njit
+
+from medor_cloth.kernel import kernel
 
 _HALF, _ONE, _ZERO, _TINY = np.float32(0.5), np.float32(1), np.float32(0), np.float32(1e-16)
 _MAX_CELLS = 1 << 15
 _LOW = np.float32(0.3)
 """Width of a cell over its height: piles are low, so a cell holds most of the layers over a place."""
-_TILT = np.float32(0.3)
+_TILT = np.float32(0.1)
 """Sine of the angle by which a triangle may turn before its points are listed anew."""
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def find_neighbours(x, margin, faces, across, points, thickness, cell, near):
     """All (triangle, point) pairs that can touch before one of their vertices leaves its margin.
 
@@ -92,7 +93,7 @@ def find_neighbours(x, margin, faces, across, points, thickness, cell, near):
     return starts, near
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def expect(x, v, horizon, least, most, expected, margin):
     """Sets where each vertex is expected in the middle of the horizon [s], and how far from there it may go [m].
 
@@ -119,7 +120,7 @@ def expect(x, v, horizon, least, most, expected, margin):
         margin[i] = least + share * way
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def n_astray(x, expected, margin):
     """Number of vertices that have left their margin; motion common to all does not count."""
     n = len(x)
@@ -136,7 +137,7 @@ def n_astray(x, expected, margin):
     return astray
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def _measure(x, a, b, c, px, py, pz, reach, chosen, thickness, own, gap):
     """Sets the way by which each chosen point is out of reach of a triangle, negative if it may touch it [m]."""
     nx, ny, nz, area = _normal(x, a, b, c)
@@ -161,7 +162,7 @@ def _measure(x, a, b, c, px, py, pz, reach, chosen, thickness, own, gap):
         gap[k] = max(above, beyond) - own - reach[q]
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def _normal(x, a, b, c):
     """Unit normal and doubled area of a triangle."""
     ux, uy, uz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
@@ -171,7 +172,7 @@ def _normal(x, a, b, c):
     return nx / area, ny / area, nz / area, area
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def _sort_into_grid(x, margin, points, cell):
     """Contact points sorted by grid cell, x fastest.
 

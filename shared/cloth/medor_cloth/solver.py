@@ -181,7 +181,7 @@ def _physics(config: SolverConfig, edge: float) -> Physics:
         "spring_damping": config.spring_damping,
         "settle_speed": 0.0,
         "cell": max(0.9 * edge, 2 * config.thickness),
-        "least_margin": 0.0015,
+        "least_margin": 0.001,
         "horizon": FRAME_S,
         "stray": 0.003,
         "most_margin": 0.003,

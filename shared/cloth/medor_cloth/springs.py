@@ -3,14 +3,14 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from medor_cloth.cloth import Springs
+from medor_cloth.kernel import kernel
 
 _ONE, _ZERO, _TINY = np.float32(1), np.float32(0), np.float32(1e-12)
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def relax_springs(x, inverse_mass, springs: Springs, compliance, compression, scratch):
     """Moves vertices towards the rest length of every spring, one colour after the other (XPBD, one iteration).
 
@@ -50,7 +50,7 @@ def relax_springs(x, inverse_mass, springs: Springs, compliance, compression, sc
             x[j, 2] -= wj * dz[k]
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@kernel
 def damp_springs(x, v, inverse_mass, pairs, share):
     """Takes a share of the relative velocity along every spring away; momentum is kept.
 
