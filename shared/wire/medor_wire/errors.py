@@ -31,6 +31,8 @@ class MedorError(Exception):
     code: str = "error"
     retry: bool = False
     """Whether asking the same again may succeed."""
+    reported: bool = False
+    """Whether a peer answered with this error; else nobody answered, or it arose here."""
 
 
 class BadRequest(MedorError):
@@ -121,4 +123,6 @@ def every_error(root: type[MedorError] = MedorError) -> dict[str, type[MedorErro
 
 def error_from(code: str, message: str) -> MedorError:
     """The error a peer reported, as the class of its code (`InternalError` for unknown codes)."""
-    return every_error().get(code, InternalError)(message)
+    error = every_error().get(code, InternalError)(message)
+    error.reported = True
+    return error

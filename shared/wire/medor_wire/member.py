@@ -17,7 +17,7 @@ from medor_wire.asking import Waiter
 from medor_wire.bus import Call, Health, Instance, Subscription
 from medor_wire.endpoints import Endpoint, Topic
 from medor_wire.envelope import Envelope
-from medor_wire.errors import BadFrame, Cancelled, Timeout, Unavailable
+from medor_wire.errors import BadFrame, Busy, Cancelled, Timeout, Unavailable
 from medor_wire.messages import Heartbeat, Message
 from medor_wire.metrics import Metrics
 from medor_wire.peers import Peers
@@ -92,10 +92,12 @@ class Member:
             except Timeout:
                 self._peers.failed(target)
                 raise
-            except Unavailable:
+            except Unavailable as error:
                 self._peers.failed(target)
                 tried.append(target)
-                if len(tried) == attempts or time.monotonic() >= deadline:
+                others = set(self._peers.of(endpoint.service)) - set(tried)
+                believed = error.reported and not isinstance(error, Busy) and not others
+                if believed or len(tried) == attempts or time.monotonic() >= deadline:
                     raise
             self._closing.wait(min(random.uniform(*PAUSE_S), max(0.0, deadline - time.monotonic())))
 
