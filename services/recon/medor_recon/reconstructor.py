@@ -71,7 +71,7 @@ class Reconstructor:
         with stopwatch.stage("points"):
             nodes = one_garment(voxel_nodes(points[garment]))
         with stopwatch.stage("surface"):
-            faces = surface(nodes, depth, camera, longest=2 * VOXEL_M, step=0.020, gap=0.25)
+            faces = surface(nodes, depth, camera, longest=2 * VOXEL_M, gap=0.25)
             if len(faces) == 0:
                 raise ReconstructionFailed(f"{len(nodes)} visible nodes do not form a surface")
             vertices, faces = compact(nodes, faces)
