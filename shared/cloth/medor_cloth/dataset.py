@@ -134,7 +134,8 @@ class Dataset:
     """
 
     def __init__(self, folder: Path | str) -> None:
-        self.shards = [_open(path) for path in shard_paths(Path(folder))]
+        self.folder = Path(folder)
+        self.shards = [_open(path) for path in shard_paths(self.folder)]
         if not self.shards:
             raise DatasetError(f"no shards (*.zarr) under {folder}")
         self.kind = self._common("kind")

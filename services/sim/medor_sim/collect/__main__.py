@@ -2,6 +2,7 @@
 
 import os
 import re
+import resource
 import signal
 import sys
 from pathlib import Path
@@ -135,6 +136,9 @@ def _collect(plan: Plan, out: Path, shard: str, workers: int, preview: bool) -> 
         with CollectionProgress(mine.total, mine.found, CONSOLE) as progress:
             cores = workers or len(os.sched_getaffinity(0))
             collect_in_processes(mine, mine.garments, cores, progress.written_one)
+        spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+        hours = (spent.ru_utime + spent.ru_stime) / 3600
+        CONSOLE.print(f"{progress.written} written in {hours:.3f} CPU-hours: {progress.written / hours:.0f} an hour")
         CONSOLE.print(f"{len(Dataset(mine.path))} trajectories in {mine.path}", soft_wrap=True)
     if preview:
         write_contact_sheet(mine.path, mine.path.with_suffix(".png"))

@@ -1,0 +1,66 @@
+import numpy as np
+
+from medor_cloth.raster import rasterize
+from medor_sim.collect.recon import CAMERA, OBSERVATIONS, look, nocs_map
+
+
+def test_shapes_and_units(recon_data):
+    for trajectory in recon_data:
+        assert trajectory["depth"].shape == trajectory["mask"].shape == (OBSERVATIONS, 200, 200)
+        np.testing.assert_array_equal(trajectory["mask"], trajectory["depth"] > 0)
+        assert not trajectory["nocs"][~trajectory["mask"]].any()
+        cloth = trajectory["depth"][trajectory["mask"]]
+        assert cloth.min() > 0.45
+        assert cloth.max() < 0.651
+
+
+def test_all_particles_are_in_view(recon_data):
+    for trajectory in recon_data:
+        assert CAMERA.contains(trajectory["positions"]).all()
+
+
+def test_depth_is_that_of_the_stored_positions(recon_data):
+    trajectory = recon_data[0]
+    for depth, positions in zip(trajectory["depth"], trajectory["positions"], strict=True):
+        again = rasterize(positions, trajectory.garment["faces"], CAMERA).depth
+        both = (depth > 0) & (again > 0)
+        assert (both == (depth > 0)).mean() > 0.999
+        assert np.median(np.abs(depth - again)[both]) < 2e-4
+
+
+def test_labels_lead_back_to_the_vertex_seen(recon_data):
+    """Canonical point of a pixel -> place on the canonical mesh -> same place on the posed mesh -> the pixel."""
+    trajectory = recon_data[0]
+    record = trajectory.garment
+    faces, canonical = record["faces"], record.garment.vertices.astype(np.float64)
+    seen = look_at(trajectory["positions"][-1], faces)
+    pixels = np.argwhere(seen.mask & trajectory["mask"][-1])[::37]
+    points = record.box.decode(trajectory["nocs"][-1][tuple(pixels.T)])
+    for pixel, point in zip(pixels, points, strict=True):
+        corners = canonical[faces[seen.face[tuple(pixel)]]]
+        weights = np.linalg.lstsq(np.vstack([corners.T, np.ones(3)]), np.append(point, 1), rcond=None)[0]
+        posed = weights @ trajectory["positions"][-1][faces[seen.face[tuple(pixel)]]]
+        column, row = CAMERA.project(posed)[0]
+        np.testing.assert_allclose([row, column], pixel + 0.5, atol=0.3)
+
+
+def test_a_vertex_seen_at_a_pixel_has_its_own_label(scene):
+    """A tiny view of the canonical mesh itself: at pixels next to a vertex the label is the vertex, to a pixel."""
+    view = look(scene, scene.flat)
+    labels = nocs_map(view, scene.garment.faces, scene.nocs)
+    row, column = np.argwhere(view.mask)[50]
+    corner = int(np.argmax(view.barycentric[row, column]))
+    vertex = scene.garment.faces[view.face[row, column], corner]
+    farthest = np.linalg.norm(scene.nocs[scene.garment.faces[view.face[row, column]]] - scene.nocs[vertex], axis=1)
+    assert np.linalg.norm(labels[row, column] - scene.nocs[vertex]) <= farthest.max()
+
+
+def test_drops_and_flat_starts_both_occur_and_moves_are_recorded(recon_data):
+    moves = np.stack([trajectory["moves"] for trajectory in recon_data])
+    assert np.isfinite(moves[:, 1:]).all()
+    dropped = np.isnan(moves[:, 0]).all(axis=(1, 2))
+    assert (dropped | np.isfinite(moves[:, 0]).all(axis=(1, 2))).all()
+
+
+def look_at(positions, faces):
+    return rasterize(positions, faces, CAMERA)
