@@ -26,7 +26,10 @@ def write_contact_sheet(folder: Path, path: Path, trajectories: int = 4) -> None
 
 
 def recon_rows(trajectory: Trajectory) -> list[list[NDArray[np.uint8]]]:
-    """Depth with the next action; the cloth lit from a side; NOCS as colours, from end to end of the garment: three rows of five observations."""
+    """Three rows of five observations: depth with the next action; the cloth lit from a side; NOCS as colours.
+
+    The colours run from end to end of the garment.
+    """
     depth, nocs, moves = trajectory["depth"], trajectory["nocs"], trajectory["moves"]
     heights = [depth_picture(one) for one in depth]
     following = [with_arrow(picture, move, CAMERA) for picture, move in zip(heights, moves[1:], strict=False)]
