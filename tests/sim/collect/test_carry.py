@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from medor_sim.collect.carry import DISTANCE_PX, HEIGHT_M, PLACE_PX, SPEED_M, Carry, carry, carry_path, random_carry
+from medor_sim.collect.harris import harris_corners
 from medor_sim.collect.recon import CAMERA, look
 
 
@@ -29,8 +30,6 @@ def test_carries_turn_towards_the_middle_of_the_image(scene, flat_view):
 
 
 def test_most_picks_are_corners(scene, flat_view):
-    from medor_sim.collect.harris import harris_corners
-
     corners = harris_corners(flat_view.mask)
     share = corners.sum() / flat_view.mask.sum()
     picks = [random_carry(flat_view, CAMERA, np.random.default_rng(seed)).pick for seed in range(200)]

@@ -12,7 +12,7 @@ def square(size=60):
 
 def test_corners_of_a_square_are_its_four_corners():
     corners = harris_corners(square())
-    spots, count = label(corners)
+    spots, count = label(corners)  # type: ignore[misc]
     centres = np.array([np.argwhere(spots == k + 1).mean(0) for k in range(count)])
     expected = np.array([[70, 60], [70, 119], [129, 60], [129, 119]])
     assert count == 4

@@ -1,7 +1,7 @@
 import numpy as np
 
-from medor_cloth.raster import rasterize
-from medor_sim.collect.recon import CAMERA, OBSERVATIONS, look, nocs_map
+from medor_cloth.raster import Raster, rasterize
+from medor_sim.collect.recon import CAMERA, OBSERVATIONS, nocs_map
 
 
 def test_shapes_and_units(recon_data):
@@ -33,7 +33,7 @@ def test_labels_lead_back_to_the_vertex_seen(recon_data):
     trajectory = recon_data[0]
     record = trajectory.garment
     faces, canonical = record["faces"], record.garment.vertices.astype(np.float64)
-    seen = look_at(trajectory["positions"][-1], faces)
+    seen = rasterize(trajectory["positions"][-1], faces, CAMERA)
     pixels = np.argwhere(seen.mask & trajectory["mask"][-1])[::37]
     points = record.box.decode(trajectory["nocs"][-1][tuple(pixels.T)])
     for pixel, point in zip(pixels, points, strict=True):
@@ -44,15 +44,12 @@ def test_labels_lead_back_to_the_vertex_seen(recon_data):
         np.testing.assert_allclose([row, column], pixel + 0.5, atol=0.3)
 
 
-def test_a_vertex_seen_at_a_pixel_has_its_own_label(scene):
-    """A tiny view of the canonical mesh itself: at pixels next to a vertex the label is the vertex, to a pixel."""
-    view = look(scene, scene.flat)
-    labels = nocs_map(view, scene.garment.faces, scene.nocs)
-    row, column = np.argwhere(view.mask)[50]
-    corner = int(np.argmax(view.barycentric[row, column]))
-    vertex = scene.garment.faces[view.face[row, column], corner]
-    farthest = np.linalg.norm(scene.nocs[scene.garment.faces[view.face[row, column]]] - scene.nocs[vertex], axis=1)
-    assert np.linalg.norm(labels[row, column] - scene.nocs[vertex]) <= farthest.max()
+def test_a_pixel_at_a_corner_of_a_face_has_the_label_of_its_vertex(scene):
+    faces = scene.garment.faces
+    corners = np.broadcast_to(np.eye(3, dtype=np.float32), (len(faces), 3, 3))
+    shown = np.repeat(np.arange(len(faces), dtype=np.int32)[:, None], 3, 1)
+    labels = nocs_map(Raster(np.ones(shown.shape, np.float32), shown, corners), faces, scene.nocs)
+    np.testing.assert_array_equal(labels, scene.nocs[faces])
 
 
 def test_drops_and_flat_starts_both_occur_and_moves_are_recorded(recon_data):
@@ -60,7 +57,3 @@ def test_drops_and_flat_starts_both_occur_and_moves_are_recorded(recon_data):
     assert np.isfinite(moves[:, 1:]).all()
     dropped = np.isnan(moves[:, 0]).all(axis=(1, 2))
     assert (dropped | np.isfinite(moves[:, 0]).all(axis=(1, 2))).all()
-
-
-def look_at(positions, faces):
-    return rasterize(positions, faces, CAMERA)

@@ -21,7 +21,8 @@ SPEED_M = 0.005
 """Way of the picker a frame [m]."""
 ABOVE_SURFACE_M = 0.005
 """Height of the picker's centre over the surface it takes hold of or lays down on [m]."""
-SETTLE_FRAMES = 100
+SETTLE_FRAMES = 40
+"""Longest time the cloth is given to settle; half of it then lies within 1 mm of where it is 0.6 s later."""
 
 
 class Carry(NamedTuple):
