@@ -14,8 +14,10 @@ from medor_cloth.kernel import kernel
 
 _HALF, _ONE, _ZERO, _TINY = np.float32(0.5), np.float32(1), np.float32(0), np.float32(1e-16)
 _MAX_CELLS = 1 << 15
-_LOW = np.float32(0.3)
-"""Width of a cell over its height: piles are low, so a cell holds most of the layers over a place."""
+_FINE, _LOW = np.float32(4), np.float32(0.08)
+"""Cells are narrow along x, along which they are read in one go, and high: piles of cloth are low."""
+_LANES = 16
+"""Points measured at once; arrays of points are longer by as many."""
 _TILT = np.float32(0.1)
 """Sine of the angle by which a triangle may turn before its points are listed anew."""
 
@@ -40,55 +42,69 @@ def find_neighbours(x, margin, faces, across, points, thickness, cell, near):
     Returns:
         (starts (F+1,), near (N,2)): the points near triangle t are near[starts[t]:starts[t+1]].
     """
-    low, counts, inverse, inverse_z, ends, order, px, py, pz, reach = _sort_into_grid(x, margin, points, cell)
+    low, counts, inverse_x, inverse_y, inverse_z, ends, order, px, py, pz, reach = _sort_into_grid(
+        x, margin, points, cell
+    )
     widest = reach.max()
     starts = np.empty(len(faces) + 1, np.int32)
     starts[0] = 0
-    boxed, gap = np.empty(len(points) + 1, np.int32), np.empty(len(points), np.float32)
+    gap = np.empty(_LANES, np.float32)
+    close = np.empty(len(points) + 1, np.int32)
     n = 0
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        ax, ay, az = x[a, 0], x[a, 1], x[a, 2]
+        ux, uy, uz = x[b, 0] - ax, x[b, 1] - ay, x[b, 2] - az
+        vx, vy, vz = x[c, 0] - ax, x[c, 1] - ay, x[c, 2] - az
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        area = math.sqrt(nx * nx + ny * ny + nz * nz + _TINY)
+        nx, ny, nz = nx / area, ny / area, nz / area
+        # Within the plane of the triangle: directions away from its sides at b and c, and what adds up to that at a.
+        length_b = math.sqrt(vx * vx + vy * vy + vz * vz + _TINY)
+        length_c = math.sqrt(ux * ux + uy * uy + uz * uz + _TINY)
+        length_a = math.sqrt((vx - ux) ** 2 + (vy - uy) ** 2 + (vz - uz) ** 2 + _TINY)
+        bx, by, bz = (vz * ny - vy * nz) / length_b, (vx * nz - vz * nx) / length_b, (vy * nx - vx * ny) / length_b
+        cx, cy, cz = (uy * nz - uz * ny) / length_c, (uz * nx - ux * nz) / length_c, (ux * ny - uy * nx) / length_c
+        share_b, share_c, height = -length_b / length_a, -length_c / length_a, area / length_a
         own = max(margin[a], margin[b], margin[c])
-        nx, ny, nz, _ = _normal(x, a, b, c)
+        level, rim = thickness + own, thickness * _TILT + own
         # A touching point lies over the triangle: it is off by the thickness along the normal, which may tilt.
-        rx = own + thickness * max(abs(nx), _TILT)
-        ry = own + thickness * max(abs(ny), _TILT)
-        rz = own + thickness * max(abs(nz), _TILT)
-        lx, hx = min(x[a, 0], x[b, 0], x[c, 0]) - rx, max(x[a, 0], x[b, 0], x[c, 0]) + rx
-        ly, hy = min(x[a, 1], x[b, 1], x[c, 1]) - ry, max(x[a, 1], x[b, 1], x[c, 1]) + ry
-        lz, hz = min(x[a, 2], x[b, 2], x[c, 2]) - rz, max(x[a, 2], x[b, 2], x[c, 2]) + rz
-        ix0 = max(0, int((lx - widest - low[0]) * inverse))
-        iy0 = max(0, int((ly - widest - low[1]) * inverse))
-        iz0 = max(0, int((lz - widest - low[2]) * inverse_z))
-        ix1 = min(counts[0] - 1, int((hx + widest - low[0]) * inverse))
-        iy1 = min(counts[1] - 1, int((hy + widest - low[1]) * inverse))
-        iz1 = min(counts[2] - 1, int((hz + widest - low[2]) * inverse_z))
+        rx = thickness * max(abs(nx), _TILT) + own + widest
+        ry = thickness * max(abs(ny), _TILT) + own + widest
+        rz = thickness * max(abs(nz), _TILT) + own + widest
+        ix0 = max(0, int((min(ax, x[b, 0], x[c, 0]) - rx - low[0]) * inverse_x))
+        iy0 = max(0, int((min(ay, x[b, 1], x[c, 1]) - ry - low[1]) * inverse_y))
+        iz0 = max(0, int((min(az, x[b, 2], x[c, 2]) - rz - low[2]) * inverse_z))
+        ix1 = min(counts[0] - 1, int((max(ax, x[b, 0], x[c, 0]) + rx - low[0]) * inverse_x))
+        iy1 = min(counts[1] - 1, int((max(ay, x[b, 1], x[c, 1]) + ry - low[1]) * inverse_y))
+        iz1 = min(counts[2] - 1, int((max(az, x[b, 2], x[c, 2]) + rz - low[2]) * inverse_z))
         m = 0
         for iz in range(iz0, iz1 + 1):
             for iy in range(iy0, iy1 + 1):
                 row = (iz * counts[1] + iy) * counts[0]
                 first = ends[row + ix0 - 1] if row + ix0 > 0 else 0
-                width = ends[row + ix1] - first
-                for k in range(width):  # without branches or gathers, so that it is vectorised
-                    q = first + k
-                    r = reach[q]
-                    outside = max(max(lx - px[q], px[q] - hx), max(ly - py[q], py[q] - hy))
-                    gap[k] = max(outside, max(lz - pz[q], pz[q] - hz)) - r
-                for k in range(width):
-                    boxed[m] = first + k
-                    m += gap[k] < _ZERO
+                last = ends[row + ix1]
+                for block in range(first, last, _LANES):
+                    for lane in range(_LANES):  # of constant length and without branches, so that it is vectorised
+                        q = block + lane
+                        gx, gy, gz = px[q] - ax, py[q] - ay, pz[q] - az
+                        beyond_b, beyond_c = gx * bx + gy * by + gz * bz, gx * cx + gy * cy + gz * cz
+                        beyond_a = share_b * beyond_b + share_c * beyond_c - height
+                        beyond = max(beyond_a, max(beyond_b, beyond_c)) - rim
+                        gap[lane] = max(abs(gx * nx + gy * ny + gz * nz) - level, beyond) - reach[q]
+                    for lane in range(min(_LANES, last - block)):
+                        close[m] = block + lane
+                        m += gap[lane] < _ZERO
         if n + m > len(near):
             longer = np.empty((2 * len(near) + m, 2), near.dtype)
             longer[:n] = near[:n]
             near = longer
-        _measure(x, a, b, c, px, py, pz, reach, boxed[:m], thickness, own, gap)
         for k in range(m):
-            if gap[k] < _ZERO:
-                i, j = points[order[boxed[k]], 0], points[order[boxed[k]], 1]
-                corner = (i == a) | (i == b) | (i == c) | (j == a) | (j == b) | (j == c)
-                hinge = (i == j) & ((i == across[t, 0]) | (i == across[t, 1]) | (i == across[t, 2]))
-                near[n, 0], near[n, 1] = i, j
-                n += not (corner | hinge)
+            i, j = points[order[close[k]], 0], points[order[close[k]], 1]
+            corner = (i == a) | (i == b) | (i == c) | (j == a) | (j == b) | (j == c)
+            hinge = (i == j) & ((i == across[t, 0]) | (i == across[t, 1]) | (i == across[t, 2]))
+            near[n, 0], near[n, 1] = i, j
+            n += not (corner | hinge)
         starts[t + 1] = n
     return starts, near
 
@@ -138,41 +154,6 @@ def n_astray(x, expected, margin):
 
 
 @kernel
-def _measure(x, a, b, c, px, py, pz, reach, chosen, thickness, own, gap):
-    """Sets the way by which each chosen point is out of reach of a triangle, negative if it may touch it [m]."""
-    nx, ny, nz, area = _normal(x, a, b, c)
-    ax, ay, az = x[a, 0], x[a, 1], x[a, 2]
-    ux, uy, uz = x[b, 0] - ax, x[b, 1] - ay, x[b, 2] - az
-    vx, vy, vz = x[c, 0] - ax, x[c, 1] - ay, x[c, 2] - az
-    along_u = _ONE / math.sqrt(ux * ux + uy * uy + uz * uz + _TINY)
-    along_v = _ONE / math.sqrt(vx * vx + vy * vy + vz * vz + _TINY)
-    along_w = _ONE / math.sqrt((vx - ux) ** 2 + (vy - uy) ** 2 + (vz - uz) ** 2 + _TINY)
-    # Gradients of the distance beyond each side of the triangle.
-    cx, cy, cz = (uy * nz - uz * ny) * along_u, (uz * nx - ux * nz) * along_u, (ux * ny - uy * nx) * along_u
-    bx, by, bz = (vz * ny - vy * nz) * along_v, (vx * nz - vz * nx) * along_v, (vy * nx - vx * ny) * along_v
-    sc, sb = along_w / along_u, along_w / along_v
-    height = area * along_w
-    for k in range(len(chosen)):  # without branches, so that it is vectorised
-        q = chosen[k]
-        gx, gy, gz = px[q] - ax, py[q] - ay, pz[q] - az
-        beyond_c, beyond_b = gx * cx + gy * cy + gz * cz, gx * bx + gy * by + gz * bz
-        beyond_a = -(sc * beyond_c + sb * beyond_b) - height
-        above = abs(gx * nx + gy * ny + gz * nz) - thickness
-        beyond = max(beyond_a, max(beyond_b, beyond_c)) - thickness * _TILT
-        gap[k] = max(above, beyond) - own - reach[q]
-
-
-@kernel
-def _normal(x, a, b, c):
-    """Unit normal and doubled area of a triangle."""
-    ux, uy, uz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-    vx, vy, vz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    area = math.sqrt(nx * nx + ny * ny + nz * nz + _TINY)
-    return nx / area, ny / area, nz / area, area
-
-
-@kernel
 def _sort_into_grid(x, margin, points, cell):
     """Contact points sorted by grid cell, x fastest.
 
@@ -182,26 +163,28 @@ def _sort_into_grid(x, margin, points, cell):
     """
     low = (x[:, 0].min(), x[:, 1].min(), x[:, 2].min())
     extent = (x[:, 0].max() - low[0], x[:, 1].max() - low[1], x[:, 2].max() - low[2])
-    inverse, inverse_z = _ONE / cell, _LOW / cell
-    while (extent[0] * inverse + 2) * (extent[1] * inverse + 2) * (extent[2] * inverse_z + 2) > _MAX_CELLS:
-        inverse *= np.float32(0.8)
+    inverse_x, inverse_y, inverse_z = _FINE / cell, _ONE / cell, _LOW / cell
+    while (extent[0] * inverse_x + 2) * (extent[1] * inverse_y + 2) * (extent[2] * inverse_z + 2) > _MAX_CELLS:
+        inverse_x *= np.float32(0.8)
+        inverse_y *= np.float32(0.8)
         inverse_z *= np.float32(0.8)
     # One cell to spare: rounding may put the outermost point past the last.
-    counts = (int(extent[0] * inverse) + 2, int(extent[1] * inverse) + 2, int(extent[2] * inverse_z) + 2)
+    counts = (int(extent[0] * inverse_x) + 2, int(extent[1] * inverse_y) + 2, int(extent[2] * inverse_z) + 2)
     ends = np.zeros(counts[0] * counts[1] * counts[2] + 1, np.int32)
     keys = np.empty(len(points), np.int32)
     for p in range(len(points)):
         i, j = points[p, 0], points[p, 1]
-        kx = int((_HALF * (x[i, 0] + x[j, 0]) - low[0]) * inverse)
-        ky = int((_HALF * (x[i, 1] + x[j, 1]) - low[1]) * inverse)
+        kx = int((_HALF * (x[i, 0] + x[j, 0]) - low[0]) * inverse_x)
+        ky = int((_HALF * (x[i, 1] + x[j, 1]) - low[1]) * inverse_y)
         kz = int((_HALF * (x[i, 2] + x[j, 2]) - low[2]) * inverse_z)
         keys[p] = (kz * counts[1] + ky) * counts[0] + kx
         ends[keys[p] + 1] += 1
     for k in range(len(ends) - 1):
         ends[k + 1] += ends[k]
     order = np.empty(len(points), np.int32)
-    px, py, pz = np.empty(len(points), np.float32), np.empty(len(points), np.float32), np.empty(len(points), np.float32)
-    reach = np.empty(len(points), np.float32)
+    size = len(points) + _LANES
+    px, py, pz = np.zeros(size, np.float32), np.zeros(size, np.float32), np.zeros(size, np.float32)
+    reach = np.zeros(size, np.float32)
     for p in range(len(points)):
         i, j = points[p, 0], points[p, 1]
         q = ends[keys[p]]
@@ -209,4 +192,4 @@ def _sort_into_grid(x, margin, points, cell):
         order[q] = p
         px[q], py[q], pz[q] = _HALF * (x[i, 0] + x[j, 0]), _HALF * (x[i, 1] + x[j, 1]), _HALF * (x[i, 2] + x[j, 2])
         reach[q] = max(margin[i], margin[j])
-    return low, counts, inverse, inverse_z, ends, order, px, py, pz, reach
+    return low, counts, inverse_x, inverse_y, inverse_z, ends, order, px, py, pz, reach

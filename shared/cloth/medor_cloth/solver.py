@@ -183,7 +183,7 @@ def _physics(config: SolverConfig, edge: float) -> Physics:
         "cell": max(0.9 * edge, 2 * config.thickness),
         "least_margin": 0.001,
         "horizon": FRAME_S,
-        "stray": 0.003,
-        "most_margin": 0.003,
+        "stray": 0.02,
+        "most_margin": 0.002,
     }
     return Physics(config.substeps, **{name: np.float32(value) for name, value in constants.items()})
