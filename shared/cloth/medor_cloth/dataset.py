@@ -3,7 +3,7 @@
 A data set is a folder of shards, at any depth; a shard is a zarr group (format 3), its name means nothing. Merging two
 data sets is moving their shards into one folder. A shard holds one group a garment, and in it one row a trajectory:
 
-    tshirt/shard-0003-of-0010.zarr      attributes: plan (everything the data depends on), shard, revision
+    tshirt/shard-0003-of-0010.zarr      attributes: plan (all the data depend on), shard, revisions
         garment-000012                  attributes: category, seed, first (id of the trajectory in row 0)
             vertices (V, 3)  faces (F, 3)  panel_uv (F, 3, 2)   the garment, canonical space
             edges (E, 2)  rest_lengths (E,)                     its cloth

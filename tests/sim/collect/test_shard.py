@@ -84,6 +84,14 @@ def test_a_garment_half_written_is_written_anew(tmp_path, monkeypatch, scene):
         np.testing.assert_array_equal(shard.add(0, scene)["vertices"], scene.garment.vertices)
 
 
+def test_going_on_with_changed_code_is_recorded(tmp_path, monkeypatch):
+    shard = Shard(RECON, 0, 1, tmp_path)
+    for revision in ("a", "b", "b"):
+        monkeypatch.setattr(shard_module, "git_revision", lambda revision=revision: revision)
+        with shard.opened():
+            assert zarr.open_group(shard.path, mode="r").attrs["revisions"] == sorted({"a", revision})
+
+
 def test_a_shard_is_for_one_process_and_one_plan(tmp_path):
     shard = Shard(RECON, 0, 1, tmp_path)
     with shard.opened(), pytest.raises(DatasetError, match="another process"), shard.opened():
@@ -123,5 +131,5 @@ def test_what_a_garment_stores(recon_data, scene):
 def test_revision_plan_and_seeds_are_recorded(recon_data):
     attributes = recon_data.shards[0].attrs.asdict()
     assert attributes["plan"]["seed"] == RECON.seed
-    assert attributes["revision"]
+    assert attributes["revisions"] == [shard_module.git_revision()]
     assert {record.seed for record in recon_data.garments} == {RECON.make_garment(k).seed for k in range(2)}

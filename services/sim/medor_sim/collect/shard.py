@@ -70,13 +70,16 @@ class Shard:
                 "format": FORMAT,
                 "plan": self.plan.record(),
                 "shard": [self.index, self.count],
-                "revision": git_revision(),
+                "revisions": [],
                 "versions": {name: version(name) for name in ("medor-sim", "medor-cloth", "numpy", "numba", "zarr")},
             }
             zarr.create_group(self.path, attributes=attributes)
-        found = zarr.open_group(self.path, mode="r").attrs.asdict()
-        if found.get("plan") != self.plan.record():
-            raise DatasetError(f"{self.path} was collected with another plan: {found.get('plan')}")
+        attributes = zarr.open_group(self.path, mode="r+").attrs
+        if attributes.get("plan") != self.plan.record():
+            raise DatasetError(f"{self.path} was collected with another plan: {attributes.get('plan')}")
+        revisions, running = attributes.asdict()["revisions"], git_revision()
+        if running not in revisions:
+            attributes["revisions"] = [*revisions, running]
         shutil.rmtree(self._unfinished, ignore_errors=True)
 
     @property

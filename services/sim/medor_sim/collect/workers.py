@@ -81,3 +81,5 @@ def _work(shard: Shard, garments: Sequence[int], following: "Synchronized[int]",
             parent.send(number)
     except ClothError as error:
         parent.send(str(error))
+    except BrokenPipeError:  # the parent was killed: what is written stays
+        return
