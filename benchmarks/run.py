@@ -20,12 +20,11 @@ from benchmarks.protocol import Trial, trials
 from benchmarks.results import Line, Results
 from benchmarks.table import markdown
 from medor_wire import endpoints
-from medor_wire.bus import Bus
+from medor_wire.bus import Bus, join
 from medor_wire.config import BusConfig
 from medor_wire.errors import MedorError
 from medor_wire.launcher import Launcher
 from medor_wire.messages import Category, EpisodePick, EpisodeProgress, Message, StartState, Task
-from medor_wire.zenoh_bus import join
 
 ALL: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
 
@@ -48,16 +47,15 @@ class Options:
 
 
 @contextmanager
-def cell_bus(router: str) -> Iterator[Bus]:
-    """A bus member in a simulated cell, started for the purpose when no router is given."""
+def cell_bus(router: str, logs: Path) -> Iterator[Bus]:
+    """A bus member in a simulated cell, started for the purpose (with its `logs`) when no router is given."""
     if router:
         with join("benchmark", BusConfig(router=router)) as bus:
             yield bus
         return
-    with Launcher(profile="sim", port=0) as cell:
+    with Launcher("sim", echo=False, logs=logs) as cell:
         cell.wait_ready()
-        with join("benchmark", BusConfig(router=cell.router)) as bus:
-            yield bus
+        yield cell.bus
 
 
 def run_trial(bus: Bus, trial: Trial, console: Console) -> list[Line]:
@@ -115,7 +113,7 @@ def main(options: Options) -> int:
     )
     missing = [trial for trial in every if trial.key not in results.finished()]
     console.print(f"{len(every) - len(missing)} of {len(every)} episodes in {results.path}")
-    failed = run_missing(missing, results, options.router, console) if missing else 0
+    failed = run_missing(missing, results, options, console) if missing else 0
     keys = {trial.key for trial in every}
     lines = [line for line in results.lines() if line["key"] in keys]
     if lines:
@@ -125,10 +123,10 @@ def main(options: Options) -> int:
     return 1 if failed else 0
 
 
-def run_missing(missing: list[Trial], results: Results, router: str, console: Console) -> int:
+def run_missing(missing: list[Trial], results: Results, options: Options, console: Console) -> int:
     """Run trials one after the other; how many failed."""
     failed, began = 0, time.monotonic()
-    with cell_bus(router) as bus:
+    with cell_bus(options.router, (options.out / "logs").absolute()) as bus:
         for done, trial in enumerate(missing):
             try:
                 results.append(run_trial(bus, trial, console))

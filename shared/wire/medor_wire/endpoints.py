@@ -23,6 +23,8 @@ class Endpoint(Generic[Request, Reply]):
     """Type of the messages streamed before the reply, if any."""
     read_only: bool = True
     """Reads are asked again when nobody answered; anything with a side effect never is."""
+    routine: bool = False
+    """Asked many times a second: its successes are counted but not logged."""
 
     @property
     def service(self) -> str:
@@ -68,7 +70,7 @@ EPISODE = Endpoint(
 CAPTURE = Endpoint("robot/capture", m.Empty, m.DepthView, timeout_s=10)
 STATUS = Endpoint("robot/status", m.Empty, m.CellStatus, timeout_s=5)
 REACH = Endpoint("robot/reach", m.ReachRequest, m.Reach, timeout_s=30)
-LEASE = Endpoint("robot/lease", m.LeaseRequest, m.Lease, timeout_s=5, read_only=False)
+LEASE = Endpoint("robot/lease", m.LeaseRequest, m.Lease, timeout_s=5, read_only=False, routine=True)
 ACT = Endpoint("robot/act", m.ActRequest, m.ActOutcome, timeout_s=120, read_only=False)
 CLEAR_STOP = Endpoint("robot/clear_stop", m.ClearStop, m.CellStatus, timeout_s=5, read_only=False)
 

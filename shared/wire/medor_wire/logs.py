@@ -39,9 +39,9 @@ def logger(name: str) -> Any:
     return structlog.get_logger().bind(part=name)
 
 
-def request(endpoint: str, request_id: str, seconds: float, outcome: str) -> None:
-    """The one line of a request."""
-    level = "error" if outcome == "internal" else "info"
+def request(endpoint: str, request_id: str, seconds: float, outcome: str, *, routine: bool = False) -> None:
+    """The one line of a request; of a routine one only if it failed."""
+    level = "error" if outcome == "internal" else "debug" if routine and outcome == "ok" else "info"
     ms = round(1e3 * seconds, 2)
     getattr(logger("request"), level)("request", endpoint=endpoint, request=request_id, ms=ms, outcome=outcome)
 

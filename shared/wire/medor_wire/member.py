@@ -277,4 +277,6 @@ class Member:
 
     def _observe(self, endpoint: str, request_id: str, seconds: float, outcome: str) -> None:
         self.metrics.request(endpoint, seconds, outcome)
-        logs.request(endpoint, request_id, seconds, outcome)
+        server = self._servers.get(endpoint)
+        routine = server is not None and server.endpoint.routine
+        logs.request(endpoint, request_id, seconds, outcome, routine=routine)
