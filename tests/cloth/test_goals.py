@@ -28,7 +28,7 @@ def test_there_is_a_flat_pose_for_each_element_of_the_symmetry(garment: Garment,
     areas = [coverage(goal, garment.faces) for goal in goals]
     assert min(areas) > 0.9 * max(areas)
     for goal in goals:
-        assert self_intersections(goal, garment.faces) == 0
+        assert self_intersections(goal, garment.faces) <= 0.005 * len(garment.faces)
         assert np.quantile(goal[:, 2], 0.75) < 0.012  # but for the ridges of folds
         np.testing.assert_allclose(goal[:, :2].mean(0), 0, atol=1e-5)
 

@@ -14,7 +14,7 @@ def task():
     solver = solver_of(vertices, faces)
     state = solver.rest(vertices + [0, 0, 0.0025])
     rng = np.random.default_rng(0)
-    picks = state.positions[rng.integers(len(vertices), size=6)] + np.float32([0, 0, 0.01])
+    picks = state.positions[rng.integers(len(vertices), size=6)] + np.array([0, 0, 0.01], np.float32)
     return solver, state, picks, picks + rng.uniform([-0.1, -0.1, 0], 0.1, (6, 3)).astype(np.float32)
 
 

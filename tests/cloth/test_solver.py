@@ -146,7 +146,7 @@ def test_a_state_saved_in_flight_with_a_held_vertex_goes_on_to_the_bit():
             now, end - begin, picker_path=path[begin:end], holding=holding[begin:end], settle_speed=0.05
         )
         file = io.BytesIO()
-        np.savez(file, **now.to_arrays())
+        np.savez(file, allow_pickle=False, **now.to_arrays())
         file.seek(0)
         with np.load(file) as arrays:
             now = ClothState.from_arrays(dict(arrays))

@@ -31,6 +31,8 @@ class Cloth:
         stretch: One spring per mesh edge.
         bend: One spring between the two vertices opposite to each edge inside a panel, at its length in the flat
             panel. Edges between panels are seams and fold freely.
+        areas: Rest area of each face (F,) [m²].
+        squares: Sum of the squared rest lengths of each face's sides (F,) [m²].
         across: For each face the vertices opposite to its three edges (F,3), -1 at a boundary.
     """
 
@@ -39,6 +41,8 @@ class Cloth:
     stretch: Springs
     bend: Springs
     across: NDArray[np.int32]
+    areas: NDArray[np.float32]
+    squares: NDArray[np.float32]
 
     @property
     def edges(self) -> NDArray[np.int32]:
@@ -96,6 +100,8 @@ class Cloth:
             stretch=_springs(pairs, rest, n),
             bend=_springs(hinges[inside], np.hypot(along, reach)[inside], n),
             across=across.reshape(faces.shape),
+            areas=(halves.length * halves.height / 2).reshape(faces.shape)[:, 0].astype(np.float32),
+            squares=(halves.length**2).reshape(faces.shape).sum(1).astype(np.float32),
         )
 
 
@@ -122,8 +128,15 @@ def _half_edges(faces: NDArray[np.int32], corners: NDArray[np.float64]) -> _Half
     height = np.sqrt(np.maximum(((apex - low) ** 2).sum(-1) - along**2, 0.0))
     pair = np.stack([np.minimum(start, end), np.maximum(start, end)], -1)
     ends = np.concatenate([low, high], -1)
-    flat = (array.reshape(-1, *array.shape[2:]) for array in (pair, opposite, length, along, height, ends, apex))
-    return _HalfEdges(*flat)
+    return _HalfEdges(
+        pair.reshape(-1, 2),
+        opposite.reshape(-1),
+        length.reshape(-1),
+        along.reshape(-1),
+        height.reshape(-1),
+        ends.reshape(-1, ends.shape[-1]),
+        apex.reshape(-1, apex.shape[-1]),
+    )
 
 
 def _twins(inverse: NDArray[np.intp], counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

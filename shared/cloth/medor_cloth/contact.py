@@ -7,12 +7,18 @@ import numpy as np
 from medor_cloth.kernel import kernel
 
 _ONE, _HALF, _QUARTER, _ZERO = np.float32(1), np.float32(0.5), np.float32(0.25), np.float32(0)
+_CRUSHED, _TORN = np.float32(0.5), np.float32(1.12)
+"""A face below this share of its rest area, or with sides longer than this multiple at rest, touches nothing.
+
+Whole cloth is never so distorted. Only in a tangle do contacts pull faces out of shape; letting go of them lets the
+layers slip apart, where pushing on would tear the tangle wider.
+"""
 _RIM = np.float32(-0.02)
 """How far outside a triangle, in barycentric weight, a point still counts as over it."""
 
 
 @kernel
-def part_layers(x, before, inverse_mass, faces, starts, near, thickness, friction, push_out):
+def part_layers(x, before, inverse_mass, faces, areas, squares, starts, near, thickness, friction, push_out):
     """Pushes every point closer than the thickness to a triangle back to the side it was on before this substep.
 
     The side is never remembered longer, so that a tangle is not locked in.
@@ -22,6 +28,8 @@ def part_layers(x, before, inverse_mass, faces, starts, near, thickness, frictio
         before: Positions at the start of the substep (V,3) [m].
         inverse_mass: (V,), 0 for a held vertex.
         faces: (F,3).
+        areas: Rest area of each face (F,) [m²].
+        squares: Sum of the squared rest lengths of each face's sides (F,) [m²].
         starts: (F+1,) first point of each triangle.
         near: Vertex pair of each point (N,2).
         thickness: Distance kept between layers [m].
@@ -39,7 +47,10 @@ def part_layers(x, before, inverse_mass, faces, starts, near, thickness, frictio
         vx, vy, vz = cx - ax, cy - ay, cz - az
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         square = nx * nx + ny * ny + nz * nz
-        if square < np.float32(1e-12):
+        dot = ux * vx + uy * vy + uz * vz
+        sides = ux * ux + uy * uy + uz * uz + vx * vx + vy * vy + vz * vz
+        crushed = square < np.float32(4) * (_CRUSHED * areas[t]) ** 2
+        if crushed or sides + sides - dot - dot > _TORN * _TORN * squares[t]:
             continue
         unit = _ONE / math.sqrt(square)
         nx, ny, nz = nx * unit, ny * unit, nz * unit

@@ -32,6 +32,8 @@ class Topology(NamedTuple):
     stretch: Springs
     bend: Springs
     points: NDArray[np.int32]
+    areas: NDArray[np.float32]
+    squares: NDArray[np.float32]
 
 
 class Physics(NamedTuple):
@@ -103,7 +105,17 @@ def simulate(x, v, picker, path, holding, held, calm, topology: Topology, physic
                     expected, margin, faces, topology.across, points, thickness, physics.cell, near
                 )
             part_layers(
-                x, before, inverse_mass, faces, starts, near, thickness, physics.layer_friction, physics.push_out
+                x,
+                before,
+                inverse_mass,
+                faces,
+                topology.areas,
+                topology.squares,
+                starts,
+                near,
+                thickness,
+                physics.layer_friction,
+                physics.push_out,
             )
             rest_on_table(x, before, inverse_mass, thickness * np.float32(0.5), physics.table_friction)
             _update_velocity(x, v, before, physics.step)

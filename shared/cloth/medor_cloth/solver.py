@@ -79,8 +79,14 @@ class ClothState:
         missing = {field.name for field in fields(cls)} - set(arrays)
         if missing:
             raise ClothError(f"a cloth state needs the arrays {sorted(missing)}")
-        values = {field.name: arrays[field.name] for field in fields(cls)}
-        return cls(**{name: int(value) if np.ndim(value) == 0 else np.array(value) for name, value in values.items()})
+        return cls(
+            positions=np.array(arrays["positions"], np.float32),
+            velocities=np.array(arrays["velocities"], np.float32),
+            held=int(arrays["held"]),
+            picker=np.array(arrays["picker"], np.float32),
+            frame=int(arrays["frame"]),
+            calm=int(arrays["calm"]),
+        )
 
 
 PARKED = np.array([-1.0, -1.0, 1.0], np.float32)
@@ -100,7 +106,13 @@ class Solver:
         self.config = config or SolverConfig()
         corners = np.repeat(np.arange(cloth.n_vertices, dtype=np.int32)[:, None], 2, 1)
         self._topology = Topology(
-            cloth.faces, cloth.across, cloth.stretch, cloth.bend, np.concatenate([corners, cloth.edges])
+            cloth.faces,
+            cloth.across,
+            cloth.stretch,
+            cloth.bend,
+            np.concatenate([corners, cloth.edges]),
+            cloth.areas,
+            cloth.squares,
         )
         self._physics = _physics(self.config, float(cloth.rest_lengths.mean()))
 

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from medor_cloth.coverage import coverage
 from medor_cloth.errors import ClothError
 from medor_cloth.goals import centred, flattened
+from medor_cloth.intersection import self_intersections
 from medor_cloth.picker import SETTLED_SPEED, pick_place
 from medor_cloth.solver import ClothState, Solver
 
@@ -22,6 +23,8 @@ HOLD_FRAMES = 50
 FALL_FRAMES = 150
 """Longest time it has to come to rest."""
 MAX_TRIES = 20
+TANGLED_SHARE = 0.01
+"""A cloth of which more pairs of faces cross, counted per face, is a tangle that no real one could be."""
 VIEW_M = 0.25
 """Cloth farther than this from the origin, along x or y, has left the view of the camera [m]."""
 _PICK_LENGTH_M = (0.05, 0.2)
@@ -32,7 +35,7 @@ def dropped(
 ) -> ClothState:
     """The cloth after it was lifted at a vertex drawn at random and let go, at rest under the camera.
 
-    Drawn again until it covers less than a share of the flat cloth.
+    Drawn again until it covers less than a share of the flat cloth and does not run through itself.
 
     Args:
         solver: The cloth's solver.
@@ -44,12 +47,13 @@ def dropped(
     Raises:
         ClothError: If no draw is crumpled enough.
     """
-    limit = max_coverage * coverage(flat.positions, solver.cloth.faces)
+    faces = solver.cloth.faces
+    limit, tangled = max_coverage * coverage(flat.positions, faces), TANGLED_SHARE * len(faces)
     for _ in range(tries):
         state = _lift_and_drop(solver, flat, rng)
-        if coverage(state.positions, solver.cloth.faces) < limit:
+        if coverage(state.positions, faces) < limit and self_intersections(state.positions, faces) <= tangled:
             return state
-    raise ClothError(f"none of {tries} drops covered less than {max_coverage:.0%} of the flat cloth")
+    raise ClothError(f"none of {tries} drops covered less than {max_coverage:.0%} of the flat cloth without a tangle")
 
 
 def picked(solver: Solver, flat: ClothState, rng: np.random.Generator, picks: int = 5) -> ClothState:

@@ -1,0 +1,132 @@
+"""How fast the cloth solver is: `python -m benchmarks.solver`.
+
+Times pick-and-places from crumpled starts on garments held out from training, their scaling over threads, and the
+solver beside PyBullet's soft body on one and the same garment and motion. CPU seconds; run it on an idle machine.
+"""
+
+import os
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+
+from benchmarks.soft_body import SoftBody
+from medor_cloth.garment import CATEGORIES, Garment, generate
+from medor_cloth.goals import flattened, solver_of
+from medor_cloth.intersection import self_intersections
+from medor_cloth.picker import PULL_FRAMES, pull
+from medor_cloth.rollout import rollouts
+from medor_cloth.solver import FRAME_S, ClothState, Solver
+from medor_cloth.start import dropped, random_pick
+
+SEED = 800123
+MANY = 500
+"""Candidates of one decision of the planner."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to time."""
+
+    candidates: int = 12
+    """Pick-and-places per garment."""
+    vertices: int = 750
+    """Size of the garments the candidates are rolled out on."""
+    bullet_vertices: int = 500
+    """Size of the T-shirt that PyBullet simulates too."""
+    bullet_s: float = 0.1
+    """Simulated time of the pull in PyBullet; 0 leaves it out."""
+
+
+def main(options: Options) -> None:
+    """Prints the measurements."""
+    for category in CATEGORIES:
+        garment = of_size(category, options.vertices)
+        solver, state = crumpled(garment)
+        seconds, crossings = candidates(garment, solver, state, options.candidates)
+        print(
+            f"{category:9} {len(garment.vertices):4} vertices: {seconds.mean():.3f} CPU-s a candidate "
+            f"({seconds.min():.3f}–{seconds.max():.3f}), {crossings:.1f} crossing faces after it; "
+            f"{MANY} candidates {MANY * seconds.mean():.0f} CPU-s"
+        )
+    threads(options)
+    if options.bullet_s:
+        beside_bullet(options)
+
+
+def candidates(garment: Garment, solver: Solver, state: ClothState, n: int) -> tuple[NDArray[np.float64], float]:
+    """CPU seconds of n pick-and-places one after the other (n,), and the mean number of crossing faces after them."""
+    picks, places = random_picks(state, n)
+    seconds, crossings = [], []
+    for pick, place in zip(picks, places, strict=True):
+        begin = time.process_time()
+        after = rollouts(solver, state, pick[None], place[None], threads=1)
+        seconds.append(time.process_time() - begin)
+        crossings.append(self_intersections(after[0], garment.faces))
+    return np.array(seconds), float(np.mean(crossings))
+
+
+def threads(options: Options) -> None:
+    """Prints the time of the same rollouts on one thread and on all."""
+    garment = of_size("tshirt", options.vertices)
+    solver, state = crumpled(garment)
+    picks, places = random_picks(state, 2 * options.candidates)
+    wall = {}
+    for n in (1, os.cpu_count() or 1):
+        begin = time.perf_counter()
+        rollouts(solver, state, picks, places, threads=n)
+        wall[n] = time.perf_counter() - begin
+    (one, alone), (n, together) = min(wall.items()), max(wall.items())
+    print(
+        f"threads: {len(picks)} candidates take {alone:.1f} s on {one}, {together:.1f} s on {n}: "
+        f"{alone / together:.2f} times as fast; {MANY} candidates {MANY * together / len(picks):.0f} s"
+    )
+
+
+def beside_bullet(options: Options) -> None:
+    """Prints the simulated seconds per CPU second of the same pull in this solver and in PyBullet."""
+    garment = of_size("tshirt", options.bullet_vertices)
+    solver, state = crumpled(garment)
+    pick, place = (points[0] for points in random_picks(state, 1))
+    path = pull(pick, place)
+    begin = time.process_time()
+    solver.advance(solver.placed(state, pick), PULL_FRAMES, picker_path=path, holding=np.ones(PULL_FRAMES, bool))
+    ours = PULL_FRAMES * FRAME_S / (time.process_time() - begin)
+    with tempfile.TemporaryDirectory() as folder:
+        body = SoftBody(garment.laid_flat(), garment.faces, Path(folder) / "cloth.obj")
+        body.place(state.positions)
+        begin = time.process_time()
+        body.pull(pick, (place - pick) / (PULL_FRAMES * FRAME_S), options.bullet_s)
+        theirs = options.bullet_s / (time.process_time() - begin)
+        body.close()
+    print(
+        f"T-shirt of {len(garment.vertices)} vertices, crumpled, pulled: {ours:.2f} simulated s per CPU-s, "
+        f"PyBullet {theirs:.3f}: {ours / theirs:.0f} times as fast"
+    )
+
+
+def of_size(category: str, vertices: int) -> Garment:
+    """A garment with about as many vertices, its edge length chosen for it."""
+    garment = generate(category, SEED)
+    return generate(category, SEED, edge_m=0.012 * (len(garment.vertices) / vertices) ** 0.5)
+
+
+def crumpled(garment: Garment) -> tuple[Solver, ClothState]:
+    """The garment after a lift and a drop; everything compiled."""
+    solver = solver_of(garment)
+    return solver, dropped(solver, flattened(garment, solver), np.random.default_rng(0))
+
+
+def random_picks(state: ClothState, n: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Picks and places (n,3) [m]."""
+    rng = np.random.default_rng(1)
+    picks, places = zip(*(random_pick(state.positions, rng) for _ in range(n)), strict=True)
+    return np.stack(picks), np.stack(places)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))
