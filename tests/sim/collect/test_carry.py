@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from medor_cloth.picker import grasp
 from medor_sim.collect.carry import DISTANCE_PX, HEIGHT_M, PLACE_PX, SPEED_M, Carry, carry, carry_path, random_carry
 from medor_sim.collect.harris import harris_corners
 from medor_sim.collect.recon import CAMERA, look
@@ -53,8 +54,9 @@ def test_a_carry_moves_the_cloth_that_was_taken(scene, flat_view):
     move = random_carry(flat_view, CAMERA, np.random.default_rng(4))
     after = carry(scene.solver, scene.flat, move)
     assert after is not None
-    taken = np.linalg.norm(scene.flat.positions - move.pick, axis=1).argmin()
-    assert np.linalg.norm((after.positions[taken] - move.place)[:2]) < 0.03
+    taken = grasp(scene.flat.positions, move.pick)
+    before, left = (np.linalg.norm((x[taken] - move.place)[:2]) for x in (scene.flat.positions, after.positions))
+    assert left < 0.4 * before, "it springs back a little where it is folded"
     assert not after.velocities.any()
 
 

@@ -1,4 +1,5 @@
 import errno
+import re
 import shutil
 from dataclasses import replace
 
@@ -131,5 +132,6 @@ def test_what_a_garment_stores(recon_data, scene):
 def test_revision_plan_and_seeds_are_recorded(recon_data):
     attributes = recon_data.shards[0].attrs.asdict()
     assert attributes["plan"]["seed"] == RECON.seed
-    assert attributes["revisions"] == [shard_module.git_revision()]
+    (revision,) = attributes["revisions"]
+    assert re.fullmatch(r"[0-9a-f]{40}\+?|unknown", revision)
     assert {record.seed for record in recon_data.garments} == {RECON.make_garment(k).seed for k in range(2)}

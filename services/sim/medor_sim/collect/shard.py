@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import zarr
@@ -74,12 +75,13 @@ class Shard:
                 "versions": {name: version(name) for name in ("medor-sim", "medor-cloth", "numpy", "numba", "zarr")},
             }
             zarr.create_group(self.path, attributes=attributes)
-        attributes = zarr.open_group(self.path, mode="r+").attrs
-        if attributes.get("plan") != self.plan.record():
-            raise DatasetError(f"{self.path} was collected with another plan: {attributes.get('plan')}")
-        revisions, running = attributes.asdict()["revisions"], git_revision()
-        if running not in revisions:
-            attributes["revisions"] = [*revisions, running]
+        group = zarr.open_group(self.path, mode="r+")
+        found: dict[str, Any] = group.attrs.asdict()
+        if found.get("plan") != self.plan.record():
+            raise DatasetError(f"{self.path} was collected with another plan: {found.get('plan')}")
+        running = git_revision()
+        if running not in found["revisions"]:
+            group.attrs["revisions"] = [*found["revisions"], running]
         shutil.rmtree(self._unfinished, ignore_errors=True)
 
     @property
