@@ -1,5 +1,7 @@
 """Small sheets of cloth that tests throw about."""
 
+from typing import Any
+
 import numpy as np
 
 from medor_cloth.cloth import Cloth
@@ -21,7 +23,7 @@ def sheet(columns: int, rows: int, edge: float = EDGE_M) -> tuple[np.ndarray, np
     return vertices, np.concatenate([first, second]).astype(np.int32)
 
 
-def solver_of(vertices: np.ndarray, faces: np.ndarray, **constants: float) -> Solver:
+def solver_of(vertices: np.ndarray, faces: np.ndarray, **constants: Any) -> Solver:
     return Solver(Cloth.from_mesh(vertices, faces), SolverConfig(**constants))
 
 
