@@ -5,7 +5,6 @@ the results file does not hold yet, appends one JSON line per pick, and prints t
 it goes on where it stopped.
 """
 
-import os
 import sys
 import time
 from collections.abc import Iterator
@@ -23,7 +22,7 @@ from medor_wire import endpoints
 from medor_wire.bus import Bus, join
 from medor_wire.config import BusConfig
 from medor_wire.errors import MedorError
-from medor_wire.launcher import Launcher
+from medor_wire.launcher import Launcher, heed_signals
 from medor_wire.messages import Category, EpisodePick, EpisodeProgress, Message, StartState, Task
 
 ALL: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
@@ -139,5 +138,5 @@ def run_missing(missing: list[Trial], results: Results, options: Options, consol
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    heed_signals()
     sys.exit(main(tyro.cli(Options, description=__doc__)))

@@ -1,7 +1,6 @@
 """The command `medor`: run a cell, watch it unfold a garment, find out what is wrong."""
 
 import json
-import signal
 import subprocess
 import sys
 import threading
@@ -13,7 +12,7 @@ from rich.console import Console
 
 from medor_wire import doctor as examination
 from medor_wire.compose import ComposeError
-from medor_wire.launcher import CellError, Launcher, is_free
+from medor_wire.launcher import CellError, Launcher, heed_signals, is_free
 from medor_wire.messages import Category, Task
 
 ROUTER_PORT = 7447
@@ -103,9 +102,7 @@ def doctor(router: str = f"tcp/127.0.0.1:{ROUTER_PORT}", port: int = 8080, as_js
 
 
 def main() -> None:
-    # Every way of asking it to end is one way; SIGINT too, since shells make background jobs ignore it.
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
+    heed_signals()
     try:
         commands = {"up": up, "demo": demo, "doctor": doctor}
         sys.exit(tyro.extras.subcommand_cli_from_dict(commands, prog="medor", description=__doc__))

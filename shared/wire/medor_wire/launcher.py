@@ -8,6 +8,7 @@ with Launcher(profile="sim") as cell:
 import http.client
 import os
 import shutil
+import signal
 import socket
 import sys
 import time
@@ -36,6 +37,15 @@ FRESH_S = 3.0
 
 class CellError(RuntimeError):
     """The cell cannot be brought up; the message says what to do."""
+
+
+def heed_signals() -> None:
+    """Make SIGINT, SIGTERM and SIGHUP raise KeyboardInterrupt in this process, so that its cells end with it.
+
+    SIGINT too: shells make background jobs ignore it.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
 
 
 class Launcher:
