@@ -48,6 +48,7 @@ def test_half_a_turn_swaps_left_and_right_and_front_and_back_but_not_the_waist(g
     front, back = goals[0], goals[order // 2]
     np.testing.assert_allclose(back[:, 0], -front[:, 0], atol=0.02)
     np.testing.assert_allclose(back[:, 1] - back[:, 1].mean(), front[:, 1] - front[:, 1].mean(), atol=0.02)
+    assert coverage(back, garment.faces) == pytest.approx(coverage(front, garment.faces), rel=0.02)
     assert np.corrcoef(front[:, 2], garment.vertices[:, 1])[0, 1] < -0.5
     assert np.corrcoef(back[:, 2], garment.vertices[:, 1])[0, 1] > 0.5
 

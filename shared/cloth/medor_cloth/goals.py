@@ -64,7 +64,8 @@ def turned(garment: Garment, element: int, order: int) -> NDArray[np.float32]:
     if element == 0:
         return layout
     if 2 * element == order:
-        return layout * np.array([-1, 1, -1], np.float32) + np.array([0, 0, np.ptp(layout[:, 2])], np.float32)
+        both = layout[:, 2].min() + layout[:, 2].max()
+        return layout * np.array([-1, 1, -1], np.float32) + np.array([0, 0, both], np.float32)
     x, y, z = layout.astype(np.float64).T
     apex = _apex(x, y)
     radius, angle = np.hypot(x, apex - y), np.arctan2(x, apex - y)
