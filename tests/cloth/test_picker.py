@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from medor_cloth.picker import PULL_FRAMES, REACH_M, SETTLE_FRAMES, grasp, pick_place, pull
+from medor_cloth.grasp import REACH_M, grasp
+from medor_cloth.picker import PULL_FRAMES, SETTLE_FRAMES, pick_place, pull
 from medor_cloth.solver import ClothState, Solver
 from tests.cloth.sheets import EDGE_M, sheet, solver_of
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from medor_cloth.cloth import Springs
 from medor_cloth.contact import part_layers, rest_on_table
+from medor_cloth.grasp import nearest_within_reach
 from medor_cloth.kernel import kernel
-from medor_cloth.picker import nearest_within_reach
 from medor_cloth.proximity import expect, find_neighbours, n_astray
 from medor_cloth.springs import damp_springs, relax_springs
 

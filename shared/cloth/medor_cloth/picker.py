@@ -1,20 +1,12 @@
 """The picker: a point that takes hold of one vertex of the cloth and carries it along."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from medor_cloth.kernel import kernel
+from medor_cloth.solver import ClothState, Solver
 
-if TYPE_CHECKING:
-    from medor_cloth.solver import ClothState, Solver
-
-REACH_M = 0.02125
-"""A closing picker grasps the nearest vertex within this distance [m] (MEDOR: threshold + picker + particle radius)."""
 PULL_FRAMES = 50
 """Frames of the pull from pick to place."""
 SETTLE_FRAMES = 30
@@ -36,16 +28,6 @@ class Outcome:
     state: ClothState
     grasped: bool
     frames: NDArray[np.float32]
-
-
-def grasp(positions: NDArray[np.float32], picker: ArrayLike) -> int:
-    """The vertex a closing picker takes: the nearest within reach, -1 for none.
-
-    Args:
-        positions: (V,3) world frame [m].
-        picker: Centre of the picker (3,) [m].
-    """
-    return int(nearest_within_reach(np.asarray(positions, np.float32), np.asarray(picker, np.float32)))
 
 
 def pull(pick: ArrayLike, place: ArrayLike) -> NDArray[np.float32]:
@@ -94,15 +76,3 @@ def pick_place(
             break
     recorded = np.stack(frames) if record_every else np.empty((0, *now.positions.shape), np.float32)
     return Outcome(now, grasped, recorded)
-
-
-@kernel
-def nearest_within_reach(x, picker):
-    """Index of the vertex of (V,3) nearest to the picker (3,) if within `REACH_M`, else -1."""
-    best, nearest = np.float32(REACH_M * REACH_M), -1
-    for i in range(len(x)):
-        dx, dy, dz = x[i, 0] - picker[0], x[i, 1] - picker[1], x[i, 2] - picker[2]
-        square = dx * dx + dy * dy + dz * dz
-        if square <= best:
-            best, nearest = square, i
-    return nearest

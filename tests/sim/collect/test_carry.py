@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from medor_cloth.picker import grasp
+from medor_cloth.grasp import grasp
 from medor_sim.collect.carry import DISTANCE_PX, HEIGHT_M, PLACE_PX, SPEED_M, Carry, carry, carry_path, random_carry
 from medor_sim.collect.harris import harris_corners
 from medor_sim.collect.recon import CAMERA, look
