@@ -1,4 +1,4 @@
-"""What a data set will hold. The same plan gives the same data on any machine, in any number of shards and sittings."""
+"""What a data set will hold. The same plan gives the same data on any machine, in any number of shards."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
