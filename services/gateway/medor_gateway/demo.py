@@ -115,13 +115,13 @@ def _show(name: str, data: dict[str, Any], status: Status, console: Console) -> 
     if name == "progress":
         status.update(f"{data['stage']} {data['fraction']:.0%}")
     elif name == "pick":
-        console.print(_line(PickReport.model_validate_json(json.dumps(data))), highlight=False)
+        console.print(_line(PickReport.model_validate_json(json.dumps(data))), highlight=False, soft_wrap=True)
 
 
 def _line(pick: PickReport) -> str:
     """`pick 3  coverage 512 cm²  NI 0.61  capture 0.1 s  …`."""
     what = "start " if pick.index == 0 else f"pick {pick.index:<2d}"
-    stages = "  ".join(f"{stage} {ms / 1000:.1f} s" for stage, ms in pick.timings_ms.items())
+    stages = "  ".join(f"{stage} {ms / 1000:.1f} s" for stage, ms in pick.timings_ms.items() if ms >= 50)
     idle = "  (nothing better than waiting)" if pick.no_op else ""
     return f"{what} coverage {pick.coverage_m2 * 1e4:4.0f} cm²  NI {pick.ni:6.3f}  {stages}{idle}"
 
