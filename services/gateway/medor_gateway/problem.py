@@ -1,6 +1,7 @@
 """Errors as RFC 9457 problem details: a status, a stable `code`, and in words what was expected and what came."""
 
 import json
+from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -70,7 +71,7 @@ def status_of(error: MedorError) -> int:
     return next(STATUS[kind] for kind in type(error).__mro__ if kind in STATUS)
 
 
-def problem(status: int, code: str, detail: str, *, retry: bool = False, errors: list[FieldError] = []) -> Problem:  # noqa: B006
+def problem(status: int, code: str, detail: str, *, retry: bool = False, errors: Sequence[FieldError] = ()) -> Problem:
     """The problem with this status and code."""
     return Problem(
         type=f"urn:medor:problem:{code}",
@@ -80,7 +81,7 @@ def problem(status: int, code: str, detail: str, *, retry: bool = False, errors:
         code=code,
         retry=retry,
         request_id=current_request_id.get(),
-        errors=errors,
+        errors=list(errors),
     )
 
 

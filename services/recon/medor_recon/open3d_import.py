@@ -1,7 +1,7 @@
 """The one door to open3d.
 
 open3d links against libusb for sensors we do not use it with. Loading the copy that the `libusb-package` wheel
-brings, before open3d asks for it, makes a plain `pip install` enough: no system package is needed.
+brings, before open3d asks for it, spares a system package.
 """
 
 import ctypes

@@ -1,9 +1,7 @@
 """A triangle mesh over the visible nodes: a height field as the camera sees it.
 
 Delaunay in the image plane, then edges that cannot be cloth are cut. All faces look at the camera and no edge has more
-than two, by construction. On six dropped and three flat garments open3d's alpha shapes (25-35 mm) closed the back as
-well: about half of the faces looked down and up to 40 % of the edges had three faces or more; ball pivoting (15-20 mm)
-lost up to 15 % of the nodes.
+than two, by construction. Alpha shapes close the back as well, with edges of three faces; ball pivoting loses nodes.
 """
 
 import numpy as np

@@ -3,7 +3,7 @@
 import threading
 import time
 from types import TracebackType
-from typing import Self
+from typing import Literal, Self
 
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Instance
@@ -68,9 +68,9 @@ class Holding:
     ) -> None:
         self.release()
 
-    def _ask(self, action: str) -> Lease:
+    def _ask(self, action: Literal["acquire", "renew", "release"]) -> Lease:
         epoch = 0 if action == "acquire" else self.epoch
-        request = LeaseRequest(holder=self._bus.presence, action=action, epoch=epoch)  # type: ignore[arg-type]
+        request = LeaseRequest(holder=self._bus.presence, action=action, epoch=epoch)
         return self._bus.ask(endpoints.LEASE, request, instance=self.robot, timeout_s=1.0)
 
     def _renew(self) -> None:
