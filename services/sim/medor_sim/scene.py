@@ -56,23 +56,31 @@ class Scene:
         return cls(piece, cloth, area, float(canonical_cost(cloth.positions, piece.goals)))
 
     def pulled(self, pick: np.ndarray, place: np.ndarray, check: Callable[[], None]) -> "Pulled":
-        """The scene after one pick-and-place of the flying picker.
-
-        The same motion as `medor_cloth.picker.pick_place`, in slices between which `check` may raise to stop it: then
-        the picker opens where it is and the cloth falls.
-        """
-        solver = self.piece.solver
-        now, grasped, stopped = solver.placed(self.cloth, pick), False, None
+        """The scene after one pick-and-place of the flying picker: the motion of `medor_cloth.picker.pick_place`."""
         path = pull(pick, place)
+        return self.carried(pick, path, np.ones(len(path), bool), check)
+
+    def carried(self, start: np.ndarray, path: np.ndarray, holding: np.ndarray, check: Callable[[], None]) -> "Pulled":
+        """The scene after the picker has walked a path, then opened, and the cloth has settled: one action.
+
+        Args:
+            start: Centre of the empty picker when the walk begins (3,) [m].
+            path: Its centre at the end of each frame of 0.01 s (T,3) [m].
+            holding: Whether it is closed in each frame (T,).
+            check: May raise between slices of the walk to stop it: then the picker opens where it is, and the cloth
+                falls and settles.
+        """
+        engine = self.piece.engine
+        now, grasped, stopped = engine.placed(self.cloth, start), False, None
         try:
             for begin in range(0, len(path), SLICE_FRAMES):
                 check()
-                part = path[begin : begin + SLICE_FRAMES]
-                now = solver.advance(now, len(part), picker_path=part, holding=np.ones(len(part), bool))
+                part = slice(begin, begin + SLICE_FRAMES)
+                now = engine.advance(now, len(path[part]), picker_path=path[part], holding=holding[part])
                 grasped |= now.held >= 0
         except MedorError as error:
             stopped = error
-        now = solver.advance(now, SETTLE_FRAMES, settle_speed=SETTLED_SPEED)
+        now = engine.advance(now, SETTLE_FRAMES, settle_speed=SETTLED_SPEED)
         return Pulled(replace(self, cloth=now, picks=self.picks + 1), grasped, stopped)
 
     def score(self) -> Score:
@@ -109,7 +117,7 @@ def start_state(piece: Piece, state: StartState, seed: int) -> ClothState:
     """The garment as an episode finds it: dropped, flat, or flat and then disturbed by random picks."""
     rng = np.random.default_rng([STATES.index(state), seed])
     if state == "drop":
-        return dropped(piece.solver, piece.flat, rng)
+        return dropped(piece.engine, piece.flat, rng)
     if state == "picks":
-        return picked(piece.solver, piece.flat, rng)
+        return picked(piece.engine, piece.flat, rng)
     return piece.flat

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from medor_cloth.coverage import coverage
+from medor_cloth.engine import Engine
 from medor_cloth.errors import ClothError
 from medor_cloth.garment import Garment, generate
 from medor_cloth.goals import flattened, goal_set, solver_of
@@ -24,6 +25,11 @@ class Piece:
         self.category: Category = category
         self.garment = garment
         self.solver = solver_of(garment)
+
+    @property
+    def engine(self) -> Engine:
+        """What moves it on the table."""
+        return self.solver
 
     @cached_property
     def flat(self):

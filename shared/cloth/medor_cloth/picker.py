@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from medor_cloth.solver import ClothState, Solver
+from medor_cloth.engine import Engine
+from medor_cloth.solver import ClothState
 
 PULL_FRAMES = 50
 """Frames of the pull from pick to place."""
@@ -38,7 +39,7 @@ def pull(pick: ArrayLike, place: ArrayLike) -> NDArray[np.float32]:
 
 
 def pick_place(
-    solver: Solver,
+    solver: Engine,
     state: ClothState,
     pick: ArrayLike,
     place: ArrayLike,
@@ -51,7 +52,7 @@ def pick_place(
     The picker appears at `pick`, closes, moves to `place` in 0.5 s and opens. There is no approach and no lowering.
 
     Args:
-        solver: The cloth's solver.
+        solver: What moves the cloth.
         state: Where the cloth is now; not modified.
         pick: Centre of the picker where it closes (3,) world frame [m].
         place: Centre of the picker where it opens (3,) world frame [m].

@@ -4,11 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from medor_cloth.coverage import coverage
+from medor_cloth.engine import Engine
 from medor_cloth.errors import ClothError
 from medor_cloth.goals import centred, flattened
 from medor_cloth.intersection import self_intersections
 from medor_cloth.picker import SETTLED_SPEED, pick_place
-from medor_cloth.solver import ClothState, Solver
+from medor_cloth.solver import ClothState
 
 __all__ = ["dropped", "flattened", "picked"]
 
@@ -31,14 +32,14 @@ _PICK_LENGTH_M = (0.05, 0.2)
 
 
 def dropped(
-    solver: Solver, flat: ClothState, rng: np.random.Generator, max_coverage: float = 0.7, tries: int = MAX_TRIES
+    solver: Engine, flat: ClothState, rng: np.random.Generator, max_coverage: float = 0.7, tries: int = MAX_TRIES
 ) -> ClothState:
     """The cloth after it was lifted at a vertex drawn at random and let go, at rest under the camera.
 
     Drawn again until it covers less than a share of the flat cloth and does not run through itself.
 
     Args:
-        solver: The cloth's solver.
+        solver: What moves the cloth.
         flat: The flattened cloth.
         rng: Source of chance.
         max_coverage: Largest coverage accepted, as a share of the flat one.
@@ -56,7 +57,7 @@ def dropped(
     raise ClothError(f"none of {tries} drops covered less than {max_coverage:.0%} of the flat cloth without a tangle")
 
 
-def picked(solver: Solver, flat: ClothState, rng: np.random.Generator, picks: int = 5) -> ClothState:
+def picked(solver: Engine, flat: ClothState, rng: np.random.Generator, picks: int = 5) -> ClothState:
     """The flat cloth after pick-and-places drawn at random, at rest.
 
     Picks that carry a part of the cloth out of the camera's view are drawn again.
@@ -93,7 +94,7 @@ def random_pick(
     return pick, (pick + direction).astype(np.float32)
 
 
-def _lift_and_drop(solver: Solver, flat: ClothState, rng: np.random.Generator) -> ClothState:
+def _lift_and_drop(solver: Engine, flat: ClothState, rng: np.random.Generator) -> ClothState:
     pick = flat.positions[rng.integers(len(flat.positions))]
     height = rng.uniform(*LIFT_M)
     frames = int(np.ceil((height - pick[2]) / (LIFT_SPEED * 0.01)))
