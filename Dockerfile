@@ -3,6 +3,8 @@ ARG PYTHON_IMAGE=python:3.11-slim-bookworm
 
 FROM ${PYTHON_IMAGE} AS build
 ARG SERVICE
+# Packages of ours the service stands on.
+ARG SHARED="./shared/wire ./shared/cloth"
 ENV PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /src
 RUN python -m venv /opt/venv
@@ -10,7 +12,7 @@ COPY constraints.txt .
 COPY shared/ shared/
 COPY services/${SERVICE}/ services/${SERVICE}/
 # One call, so that our packages find each other instead of being looked for on an index.
-RUN /opt/venv/bin/python -m pip install -c constraints.txt ./shared/wire ./shared/cloth ./services/${SERVICE}
+RUN /opt/venv/bin/python -m pip install -c constraints.txt ${SHARED} ./services/${SERVICE}
 
 FROM ${PYTHON_IMAGE} AS runtime
 ARG SERVICE

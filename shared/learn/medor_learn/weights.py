@@ -1,0 +1,104 @@
+"""A network as a folder: `weights.safetensors`, `config.json` (all it takes to build it), `card.md` (for people)."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor, nn
+
+from medor_learn.errors import WeightsError
+
+WEIGHTS, CONFIG, CARD = "weights.safetensors", "config.json", "card.md"
+
+
+def save(
+    folder: Path, module: nn.Module, config: Mapping[str, Any], card: Mapping[str, Any], half: bool = False
+) -> None:
+    """Write a network so that `load` needs nothing else; each file is replaced at once.
+
+    Args:
+        folder: made if need be.
+        module: the network.
+        config: what `build` takes, as JSON: preset, normaliser, seeds, revision, metrics.
+        card: what a reader should know, heading by heading.
+        half: store matrices and kernels as float16, to ship them. Vectors (biases, statistics of norms) stay.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    state = {name: _stored(tensor, half) for name, tensor in module.state_dict().items()}
+    _replace(folder / WEIGHTS, lambda path: save_file(state, path))
+    _replace(folder / CONFIG, lambda path: path.write_text(json.dumps(config, indent=2) + "\n"))
+    _replace(folder / CARD, lambda path: path.write_text(markdown(card)))
+
+
+def load(
+    folder: Path, build: Callable[[dict[str, Any]], nn.Module], device: str = "cpu"
+) -> tuple[nn.Module, dict[str, Any]]:
+    """The network of a folder, ready to use (float32, evaluation mode), and its config.
+
+    Args:
+        folder: written by `save`.
+        build: makes the network, with any weights, from the config.
+        device: where to put it.
+
+    Raises:
+        WeightsError: what is missing, superfluous, of another shape or unreadable.
+    """
+    config = read_config(folder)
+    try:
+        state = load_file(folder / WEIGHTS)
+    except (OSError, SafetensorError) as error:
+        raise WeightsError(f"{folder / WEIGHTS}: expected a safetensors file ({error})") from error
+    module = build(config)
+    _check(folder, module.state_dict(), state)
+    module.load_state_dict(state)
+    return module.to(device).eval(), config
+
+
+def read_config(folder: Path) -> dict[str, Any]:
+    """What a folder says about its network.
+
+    Raises:
+        WeightsError: there is none, or it is not JSON.
+    """
+    try:
+        return json.loads((folder / CONFIG).read_text())
+    except (OSError, json.JSONDecodeError) as error:
+        raise WeightsError(f"{folder}: expected a folder of weights with a {CONFIG} ({error})") from error
+
+
+def markdown(card: Mapping[str, Any]) -> str:
+    """A card as a page: text as it is, anything else as JSON."""
+    parts = [f"## {heading}\n\n{_prose(text)}\n" for heading, text in card.items()]
+    return "\n".join(["# Model card\n", *parts])
+
+
+def _prose(text: Any) -> str:
+    return text if isinstance(text, str) else f"```json\n{json.dumps(text, indent=2)}\n```"
+
+
+def _stored(tensor: Tensor, half: bool) -> Tensor:
+    tensor = tensor.detach().cpu().contiguous()
+    return tensor.to(torch.float16) if half and tensor.is_floating_point() and tensor.ndim > 1 else tensor
+
+
+def _replace(path: Path, write: Callable[[Path], Any]) -> None:
+    partial = path.with_name(f".{path.name}.partial")
+    write(partial)
+    partial.replace(path)
+
+
+def _check(folder: Path, wanted: Mapping[str, Tensor], found: Mapping[str, Tensor]) -> None:
+    faults = [f"{name} is missing" for name in sorted(wanted.keys() - found.keys())]
+    faults += [f"{name} is unknown" for name in sorted(found.keys() - wanted.keys())]
+    faults += [
+        f"{name} has shape {tuple(found[name].shape)} instead of {tuple(wanted[name].shape)}"
+        for name in sorted(wanted.keys() & found.keys())
+        if found[name].shape != wanted[name].shape
+    ]
+    if faults:
+        more = f" and {len(faults) - 3} more" if len(faults) > 3 else ""
+        raise WeightsError(f"{folder} does not fit the network of its config: {'; '.join(faults[:3])}{more}")
