@@ -1,0 +1,42 @@
+"""How long and with which weights finetuning runs; the paper's ablations are other weights."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of iterations with one set of weights and one optimiser, which starts without momentum."""
+
+    iterations: int = 50
+    chamfer: float = 1.0
+    """Weight of the observed points' distance to the visible vertices."""
+    consistency: float = 10.0
+    """Weight of the vertices' distance to the points observed at the same canonical coordinate."""
+    table: float = 10.0
+    """Weight of what lies lower than cloth on a table can."""
+    stretch: float = 0.0
+    """Weight of edges longer than in canonical space; not in the paper's method."""
+
+
+@dataclass(frozen=True)
+class RefineConfig:
+    """All of finetuning's constants."""
+
+    phases: tuple[Phase, ...] = (Phase(), Phase(consistency=0.0))
+    """Canonical coordinates first bring every vertex roughly home; their error must not hold it there."""
+    learning_rate: float = 1e-3
+    """About the way of a vertex along each axis in one iteration [m]: a phase cannot repair more than 5 cm."""
+    look_every: int = 5
+    """Iterations between two looks at which vertices are visible."""
+    reach: float = 2 / 64
+    """Farthest observed cell that a vertex is bound to, in the NOCS cube."""
+    bind_hidden: bool = True
+    """Whether vertices hidden at the start are bound as well, as in the paper: those just behind the rim of what is
+    seen are then drawn out into view."""
+
+
+PAPER = RefineConfig()
+JOINT = RefineConfig(phases=(Phase(iterations=100),))
+"""Canonical coordinates hold to the end (MEDOR, ablation "joint optimization")."""
+NO_CONSISTENCY = RefineConfig(phases=(Phase(consistency=0.0), Phase(consistency=0.0)))
+"""Canonical coordinates are not used (MEDOR, ablation "no consistency")."""
