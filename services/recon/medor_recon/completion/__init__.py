@@ -1,0 +1,1 @@
+"""From a view whose pixels know their canonical coordinates to the whole garment, seen and hidden parts alike."""
