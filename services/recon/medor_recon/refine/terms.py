@@ -21,10 +21,8 @@ def chamfer(points: NDArray[np.float64], positions: NDArray[np.float64], visible
         visible: (n,) ids of the vertices seen, at least one.
     """
     owner, square = nearest(points, positions, visible)
-    scale = 1 / points.size
-    owned = np.bincount(owner, minlength=len(positions))[:, None] * positions
-    pulling = np.stack([np.bincount(owner, axis, len(positions)) for axis in points.T], axis=1)
-    return float(square.sum() * scale), np.asarray(2 * scale * (owned - pulling), np.float64)
+    pull = (2 / points.size) * (positions[owner] - points)
+    return float(square.sum() / points.size), _gathered(owner, pull, len(positions))
 
 
 def consistency(positions: NDArray[np.float64], bound: NDArray[np.integer], targets: NDArray[np.float64]) -> Term:
@@ -50,9 +48,7 @@ def stretch(positions: NDArray[np.float64], edges: NDArray[np.integer], rest_len
     length = np.linalg.norm(side, axis=1)
     excess = np.maximum(length - rest_lengths, 0)
     pull = (2 / len(edges)) * (excess / np.maximum(length, 1e-12))[:, None] * side
-    ends = np.concatenate([second, first])
-    both = np.concatenate([pull, -pull])
-    gradient = np.stack([np.bincount(ends, axis, len(positions)) for axis in both.T], axis=1)
+    gradient = _gathered(second, pull, len(positions)) - _gathered(first, pull, len(positions))
     return float((excess**2).mean()), gradient
 
 
@@ -94,3 +90,13 @@ def _nearest(points, candidates):
                 best, row = square, c
         rows[p], squares[p] = row, best
     return rows, squares
+
+
+@kernel
+def _gathered(rows, values, count):
+    """(count, 3) sums of the values (n, 3) that go to each row."""
+    sums = np.zeros((count, 3))
+    for k in range(len(rows)):
+        for axis in range(3):
+            sums[rows[k], axis] += values[k, axis]
+    return sums
