@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from medor_wire.messages import Category, EpisodeRequest, ResetRequest, StartState, Task
+from medor_wire.messages import Category, EpisodeRequest, Executor, ResetRequest, StartState, Task
 
 HELD_OUT_SEED = 800_000
 """First garment seed that nothing is ever trained on."""
@@ -20,11 +20,18 @@ class Trial:
     start: StartState
     picks: int
     candidates: int
+    executor: Executor = "picker"
 
     @property
     def key(self) -> str:
         """Names the trial in the results file; the same key is never run twice into one file."""
-        return f"{self.method}/{self.category}/{self.task}/{self.start}{self.state}/p{self.picks}/k{self.candidates}"
+        key = f"{self.method}/{self.category}/{self.task}/{self.start}{self.state}/p{self.picks}/k{self.candidates}"
+        return key if self.executor == "picker" else f"{key}/{self.executor}"
+
+    @property
+    def label(self) -> str:
+        """The method, and who picked when that is not the flying gripper."""
+        return self.method if self.executor == "picker" else f"{self.method} ({self.executor})"
 
     def request(self) -> EpisodeRequest:
         """Garment and crumple depend on the state alone, so that all methods and tasks meet the same states."""
@@ -35,6 +42,7 @@ class Trial:
             max_picks=self.picks,
             candidates=self.candidates,
             seed=self.state,
+            executor=self.executor,
             reset=ResetRequest(
                 category=self.category,
                 garment_seed=HELD_OUT_SEED + self.state,
@@ -52,10 +60,12 @@ def trials(
     start: StartState,
     picks: int,
     candidates: int,
+    executors: tuple[Executor, ...] = ("picker",),
 ) -> Iterator[Trial]:
     """State by state, so that an unfinished run has every method on the same first states."""
     for state in range(states):
         for category in categories:
             for task in tasks:
                 for method in methods:
-                    yield Trial(method, category, task, state, start, picks, candidates)
+                    for executor in executors:
+                        yield Trial(method, category, task, state, start, picks, candidates, executor)

@@ -23,7 +23,7 @@ from medor_wire.bus import Bus, join
 from medor_wire.config import BusConfig
 from medor_wire.errors import MedorError
 from medor_wire.launcher import Launcher, heed_signals
-from medor_wire.messages import Category, EpisodePick, EpisodeProgress, Message, StartState, Task
+from medor_wire.messages import Category, EpisodePick, EpisodeProgress, Executor, Message, StartState, Task
 
 ALL: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
 
@@ -40,6 +40,8 @@ class Options:
     start: StartState = "drop"
     picks: int = 10
     candidates: int = 100
+    executor: tuple[Executor, ...] = ("picker",)
+    """Who picks: the paper's flying gripper, the Panda arm, or both on the same states."""
     out: Path = Path("runs/bench")
     router: str = ""
     """Zenoh endpoint of a running cell; empty starts one."""
@@ -77,7 +79,7 @@ def run_trial(bus: Bus, trial: Trial, console: Console) -> list[Line]:
         lines.append(
             {
                 "key": trial.key,
-                "method": trial.method,
+                "method": trial.label,
                 "category": trial.category,
                 "task": trial.task,
                 "state": trial.state,
@@ -108,6 +110,7 @@ def main(options: Options) -> int:
             options.start,
             options.picks,
             options.candidates,
+            options.executor,
         )
     )
     missing = [trial for trial in every if trial.key not in results.finished()]

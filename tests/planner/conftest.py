@@ -94,6 +94,9 @@ class Cell:
     ledger: Ledger
     acts: list[str] = field(default_factory=list)
     """Ids of the actions that moved something."""
+    executors: list[str] = field(default_factory=list)
+    """Who was to carry them out."""
+    asked_reach_of: list[str] = field(default_factory=list)
     leases: list[str] = field(default_factory=list)
     in_reach: Callable[[np.ndarray], np.ndarray] = field(default=lambda points: np.ones(len(points), bool))
 
@@ -125,7 +128,9 @@ class Cell:
         return view_of(self.positions, self.garment.faces, self.camera)
 
     def reach(self, request: ReachRequest, call: Call) -> Reach:
-        return Reach(reachable=self.in_reach(request.points))
+        self.asked_reach_of.append(request.executor)
+        ends = [request.points] if request.places is None else [request.points, request.places]
+        return Reach(reachable=np.all([self.in_reach(end) for end in ends], axis=0))
 
     def lease(self, request: LeaseRequest, call: Call) -> Lease:
         self.leases.append(request.action)
@@ -136,6 +141,7 @@ class Cell:
 
     def _move(self, request: ActRequest, check: Check) -> ActOutcome:
         self.acts.append(request.action_id)
+        self.executors.append(request.executor)
         outcome = pick_place(self.solver, self.state, request.pick, request.place, settle_frames=100)
         self.state = self.solver.rest(outcome.state.positions)
         return ActOutcome(action_id=request.action_id, grasped=outcome.grasped)

@@ -45,6 +45,12 @@ def test_the_same_seed_gives_the_same_episode_pick_for_pick(lab):
     assert len(one.picks) > 1
 
 
+def test_an_episode_is_executed_by_who_it_asks_for(lab):
+    panda = FLATTEN.model_copy(update={"executor": "panda", "max_picks": 1})
+    assert len(lab.bus.ask(endpoints.EPISODE, panda).picks) == 2
+    assert lab.cell.executors == lab.cell.asked_reach_of == ["panda"]
+
+
 def test_every_pick_draws_other_candidates(lab):
     lab.cell.lay(lab.cell.flat)
     flat = FLATTEN.model_copy(update={"reset": None, "max_picks": 2, "candidates": 4, "stop_ni": 1e12})

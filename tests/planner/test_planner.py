@@ -6,7 +6,7 @@ import pytest
 
 from medor_wire import endpoints
 from medor_wire.errors import BadRequest, Cancelled, Unavailable
-from medor_wire.messages import Plan, PlanProgress, PlanRequest
+from medor_wire.messages import ExecuteRequest, Plan, PlanProgress, PlanRequest
 
 ORACLE = PlanRequest(category="tshirt", method="oracle", candidates=12, seed=5)
 
@@ -107,6 +107,13 @@ def test_places_out_of_reach_are_not_rolled_out(lab):
     lab.cell.in_reach = lambda points: points[:, 1] > 0
     plan = lab.bus.ask(endpoints.PLAN, ORACLE)
     assert min(plan.top_picks[:, 1].min(), plan.top_places[:, 1].min()) > 0
+
+
+def test_who_picks_is_asked_for_its_reach_and_does_the_picking(lab):
+    plan = lab.bus.ask(endpoints.PLAN, ORACLE.model_copy(update={"executor": "panda"}))
+    assert set(lab.cell.asked_reach_of) == {"panda"}
+    lab.bus.ask(endpoints.EXECUTE, ExecuteRequest(plan_id=plan.plan_id))
+    assert lab.cell.executors == ["panda"]
 
 
 def test_the_visible_method_plans_on_what_the_camera_sees(lab):

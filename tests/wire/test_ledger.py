@@ -54,6 +54,14 @@ def test_the_same_id_with_another_pick_is_refused(ledger: Ledger) -> None:
     assert arm.moves == 1
 
 
+def test_the_same_id_with_another_executor_is_refused(ledger: Ledger) -> None:
+    arm = Arm()
+    ledger.once(request(), arm)
+    with pytest.raises(IdReused):
+        ledger.once(request().model_copy(update={"executor": "panda"}), arm)
+    assert arm.moves == 1
+
+
 def test_a_failure_is_an_outcome_too(ledger: Ledger) -> None:
     moves = []
 

@@ -22,6 +22,7 @@ from medor_wire.messages import (
     DepthView,
     EpisodePick,
     EpisodeRequest,
+    Executor,
     GarmentId,
     Plan,
     PlanRequest,
@@ -43,6 +44,9 @@ def _unicode(text: str) -> str:
 Text = Annotated[str, AfterValidator(_unicode)]
 Seed = Annotated[int, Field(ge=0, lt=2**31, description="The same seed gives the same result.")]
 MethodName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,63}$", description="A named planner preset.")]
+ExecutorName = Annotated[
+    Executor, Field(description="Simulated cell only: the flying gripper of the paper, or the Panda arm.")
+]
 EndReason = Literal["solved", "max_picks", "no_op"]
 Triple = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 Point = tuple[float, float, float]
@@ -211,6 +215,7 @@ class ClearCommand(Command):
 class PlanOptions(Command):
     candidates: Annotated[int, Field(ge=1, le=5000, description="Pick-and-places tried in the model.")] = 100
     seed: Seed = 0
+    executor: ExecutorName = "picker"
 
 
 class PlanCommand(Command):
@@ -232,6 +237,7 @@ class PlanCommand(Command):
             view=self.observation and self.observation.view(),
             candidates=self.options.candidates,
             seed=self.options.seed,
+            executor=self.options.executor,
         )
 
 
@@ -325,6 +331,7 @@ class OutcomeReport(Report):
 
 class EpisodeOptions(Command):
     candidates: Annotated[int, Field(ge=1, le=5000)] = 100
+    executor: ExecutorName = "picker"
 
 
 class EpisodeCommand(Command):
@@ -352,6 +359,7 @@ class EpisodeCommand(Command):
             max_picks=self.max_picks,
             candidates=self.options.candidates,
             seed=self.seed,
+            executor=self.options.executor,
             reset=self._reset(),
         )
 

@@ -65,5 +65,6 @@ class Choice:
             top_places=self.candidates.places[top],
             top_rewards=self.rewards[top],
             candidates=len(self.candidates),
+            executor=request.executor,
             timings_ms=timings_ms,
         )

@@ -69,6 +69,7 @@ class Episodes:
             view=view,
             candidates=request.candidates,
             seed=request.seed,
+            executor=request.executor,
         )
         plan = self._planner.plan_pick(
             asked, index, call, lambda progress: call.progress(EpisodeProgress(planning=progress))

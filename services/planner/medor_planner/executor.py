@@ -52,4 +52,7 @@ def act(robot: Holding, plan: Plan) -> ActOutcome:
     """Do a plan's action; nothing moves when the plan is to do nothing."""
     if plan.no_op:
         return ActOutcome(action_id=plan.plan_id, grasped=False)
-    return robot.act(ActRequest(action_id=plan.plan_id, epoch=robot.epoch, pick=plan.pick, place=plan.place))
+    request = ActRequest(
+        action_id=plan.plan_id, epoch=robot.epoch, pick=plan.pick, place=plan.place, executor=plan.executor
+    )
+    return robot.act(request)

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from medor_wire.messages import (
     ClothMesh,
     DepthView,
     Empty,
+    Executor,
     Plan,
     PlanProgress,
     PlanRequest,
@@ -52,12 +54,13 @@ class Planner:
 
         Raises:
             BadRequest: unknown method, or another category on the table.
-            OutOfReach: no candidate has both ends in the arm's reach.
+            OutOfReach: no candidate can be carried out.
             Unavailable: a service that is needed does not answer.
         """
         method = method_named(request.method)
         rng = np.random.default_rng([request.seed, index])
         stages = Stages(call, tell)
+        reachable = partial(self._reachable, request.executor)
         with cancelling(call) as cancel:
             with stages.stage("capture"):
                 view = request.view or self._bus.ask(endpoints.CAPTURE, Empty(), cancel=cancel)
@@ -65,12 +68,12 @@ class Planner:
                 scene = Scene(self._mesh(method, request, view, cancel), view)
             if method.dynamics is None:
                 with stages.stage("sample"):
-                    choice = Choice.unrated(random_action(scene, rng, self._reachable))
+                    choice = Choice.unrated(random_action(scene, rng, reachable))
             else:
                 with stages.stage("goals"):
                     reward = self._reward(method, request, scene.mesh, cancel)
                 with stages.stage("sample"):
-                    candidates = sample(scene, request.candidates, rng, reachable=self._reachable)
+                    candidates = sample(scene, request.candidates, rng, reachable=reachable)
                 with stages.stage("rollout"):
                     choice = self._shoot(method, scene.mesh, candidates, reward, stages, cancel)
         plan = choice.plan(request, scene.mesh, stages.total())
@@ -91,8 +94,11 @@ class Planner:
             return Reward(task="flatten")
         return self._goals.reward(method, mesh, cancel)
 
-    def _reachable(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
-        return self._bus.ask(endpoints.REACH, ReachRequest(points=points)).reachable
+    def _reachable(
+        self, executor: Executor, picks: NDArray[np.float32], places: NDArray[np.float32]
+    ) -> NDArray[np.bool_]:
+        request = ReachRequest(points=picks, places=places, executor=executor)
+        return self._bus.ask(endpoints.REACH, request).reachable
 
     def _shoot(
         self,

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from medor_planner.sampling import Candidates, Scene, Test, sample
+from medor_planner.sampling import Candidates, Reachable, Scene, sample
 
 CLEARANCE_M = 0.02
 """A place is off the cloth when no vertex is nearer than this, seen from above [m]."""
 
 
-def random_action(scene: Scene, rng: np.random.Generator, reachable: Test) -> Candidates:
+def random_action(scene: Scene, rng: np.random.Generator, reachable: Reachable) -> Candidates:
     """One candidate, drawn like those of random shooting but with its place beside the garment."""
     return sample(scene, 1, rng, reachable=reachable, place_allowed=OffTheCloth(scene))
 

@@ -31,6 +31,8 @@ ROUNDS = 10
 
 Test = Callable[[NDArray[np.float32]], NDArray[np.bool_]]
 """Points (..., 3) [m] -> (...) bool."""
+Reachable = Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.bool_]]
+"""Picks and places (N, 3) [m] -> (N,) bool: whether the cell can do the pull between them."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +61,15 @@ def anywhere(points: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 def sample(
-    scene: "Scene", count: int, rng: np.random.Generator, *, reachable: Test, place_allowed: Test = anywhere
+    scene: "Scene", count: int, rng: np.random.Generator, *, reachable: Reachable, place_allowed: Test = anywhere
 ) -> Candidates:
-    """Up to `count` candidates whose places are in view and allowed, with both ends in the arm's reach.
+    """Up to `count` candidates whose places are in view and allowed, and which the cell can carry out.
 
     Args:
         scene: the garment as seen.
         count: how many to look for; fewer come back only where hardly anything is in reach.
         rng: source of all randomness.
-        reachable: asked once a round for all picks and places proposed, (N, 3).
+        reachable: asked once a round for all picks and places proposed.
         place_allowed: further condition on places.
 
     Raises:
@@ -76,12 +78,11 @@ def sample(
     found = NOTHING
     for _ in range(ROUNDS):
         proposed = scene.propose(count - len(found), rng, place_allowed)
-        pick_reached, place_reached = np.split(reachable(np.concatenate([proposed.picks, proposed.places])), 2)
-        found += proposed.where(pick_reached & place_reached)
+        found += proposed.where(reachable(proposed.picks, proposed.places))
         if len(found) == count:
             return found
     if not len(found):
-        raise OutOfReach("no pick-and-place of the garment has both ends in the arm's reach and its place in view")
+        raise OutOfReach("no pick-and-place of the garment is in the arm's reach with its place in view")
     return found
 
 

@@ -55,7 +55,11 @@ class Driver:
         return self._motion.status("robot", detail=f"{self._arm.detail}; {self._camera.detail}")
 
     def reach(self, request: m.ReachRequest, call: Call) -> m.Reach:
-        return m.Reach(reachable=self._workspace.contains(request.points))
+        """Ends within the workspace; it is convex, so that the pull between them is too."""
+        reachable = self._workspace.contains(request.points)
+        if request.places is not None:
+            reachable &= self._workspace.contains(request.places)
+        return m.Reach(reachable=reachable)
 
     def act(self, request: m.ActRequest, call: Call) -> m.ActOutcome:
         """One pick-and-place within the workspace.

@@ -133,7 +133,7 @@ def _exchanges() -> dict[Endpoint, Exchange]:
         e.EPISODE: Exchange(m.EpisodeRequest(reset=m.ResetRequest()), episode(), episode_progress()),
         e.CAPTURE: Exchange(m.Empty(), view()),
         e.STATUS: Exchange(m.Empty(), STATUS),
-        e.REACH: Exchange(m.ReachRequest(points=TOP), m.Reach(reachable=np.array([True, False]))),
+        e.REACH: Exchange(m.ReachRequest(points=TOP, places=TOP), m.Reach(reachable=np.array([True, False]))),
         e.LEASE: Exchange(m.LeaseRequest(holder="planner/1f2e3d4c"), m.Lease(epoch=3, ttl_s=2.0)),
         e.ACT: Exchange(m.ActRequest(action_id="act-1", epoch=3, pick=PICK, place=PLACE), OUTCOME),
         e.CLEAR_STOP: Exchange(m.ClearStop(operator="ada"), STATUS),

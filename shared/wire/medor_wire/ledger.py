@@ -53,7 +53,7 @@ class Ledger:
         """The outcome of `request`, running `act` only if this action id was never seen.
 
         Raises:
-            IdReused: the id was seen with another pick or place.
+            IdReused: the id was seen with another pick, place or executor.
             OutcomeUnknown: the action was interrupted by a crash; look again before acting.
             Busy: the action is running at this moment.
             MedorError: what `act` raised, now or when it ran.
@@ -124,7 +124,7 @@ def _recorded(
     request: ActRequest, content: bytes, seen: bytes, state: str, outcome: bytes, code: str, message: str
 ) -> ActOutcome:
     if seen != content:
-        raise IdReused(f"action {request.action_id} was asked before with another pick or place")
+        raise IdReused(f"action {request.action_id} was asked before with another pick, place or executor")
     if state == "executing":
         raise Busy(f"action {request.action_id} is running")
     if state == "unknown":
@@ -136,4 +136,7 @@ def _recorded(
 
 def _digest(request: ActRequest) -> bytes:
     """Of what the action does; the epoch may differ when a new holder repeats it."""
-    return hashlib.sha256(request.pick.tobytes() + request.place.tobytes()).digest()
+    content = request.pick.tobytes() + request.place.tobytes()
+    if request.executor != "picker":  # as before there were others, so that older ledgers stay valid
+        content += request.executor.encode()
+    return hashlib.sha256(content).digest()

@@ -15,6 +15,8 @@ from medor_wire.arrays import Shape, Vector3
 Category = Literal["trousers", "tshirt", "dress", "skirt", "jumpsuit"]
 Task = Literal["flatten", "canonicalize"]
 StartState = Literal["drop", "flat", "picks"]
+Executor = Literal["picker", "panda"]
+"""Who carries a pick-and-place out in the simulated cell: the flying gripper or the arm. A real cell has its arm."""
 
 F4 = NDArray[np.float32]
 F8 = NDArray[np.float64]
@@ -217,6 +219,7 @@ class ActRequest(Message):
     epoch: int
     pick: Vector3
     place: Vector3
+    executor: Executor = "picker"
 
 
 class ActOutcome(Message):
@@ -232,7 +235,11 @@ class ActOutcome(Message):
 
 
 class ReachRequest(Message):
+    """Whether the tool gets to points [m] or, with `places`, whether pulls from points to places can be done."""
+
     points: Annotated[F4, Shape("K 3", "f4")]
+    places: Annotated[F4, Shape("K 3", "f4")] | None = None
+    executor: Executor = "picker"
 
 
 class Reach(Message):
@@ -318,6 +325,7 @@ class PlanRequest(Message):
     """Absent: the cell is asked for one."""
     candidates: int = Field(default=100, ge=1, le=5000)
     seed: int = Field(default=0, ge=0, lt=2**31)
+    executor: Executor = "picker"
 
 
 class PlanProgress(Message):
@@ -344,6 +352,8 @@ class Plan(Message):
     top_rewards: Annotated[F8, Shape("T", "f8")]
     candidates: int
     """Evaluated, the no-op not counted."""
+    executor: Executor = "picker"
+    """Whose reach the candidates were sampled in; carries the plan out."""
     timings_ms: dict[str, float]
 
 
@@ -358,6 +368,7 @@ class EpisodeRequest(Message):
     max_picks: int = Field(default=10, ge=1, le=100)
     candidates: int = Field(default=100, ge=1, le=5000)
     seed: int = Field(default=0, ge=0, lt=2**31)
+    executor: Executor = "picker"
     reset: ResetRequest | None = None
     """Absent: go on from what lies on the table."""
     stop_ni: float = 0.95
