@@ -1,0 +1,94 @@
+"""How far from the truth rollouts end: `python -m medor_dynamics.evaluate --weights DIR --test DIR`."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+import tyro
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from medor_cloth.dataset import Dataset
+from medor_dynamics.model import Dynamics
+from medor_dynamics.preset import PULL_STEPS, STEPS
+from medor_dynamics.samples import Recording, recordings, stretches
+from medor_dynamics.shipped import DEFAULT, load
+
+TOGETHER = 8
+"""Recordings rolled out in one batch."""
+
+
+@torch.inference_mode()
+def rollout_errors(model: Dynamics, recordings: Sequence[Recording]) -> NDArray[np.float64]:
+    """(R, 16) distance of the nodes from where they were recorded, mean over nodes, after each step [m]."""
+    errors = [rolled for few in in_parts(recordings) for rolled in errors_of(model, few)]
+    return np.array(errors)
+
+
+def errors_of(model: Dynamics, recordings: Sequence[Recording]) -> NDArray[np.float64]:
+    """`rollout_errors` of a few recordings at once."""
+    starts = [0] * len(recordings)
+    batch = stretches(recordings, starts, [each.before(0) for each in recordings], STEPS)
+    motion, errors = batch.motion, []
+    for grip, target in zip(batch.grips, batch.targets, strict=True):
+        motion = model(batch.graphs, motion, grip)
+        distance = (motion.positions - target).norm(dim=1).numpy()
+        errors.append(np.add.reduceat(distance, batch.graphs.starts[:-1]) / np.diff(batch.graphs.starts))
+    return np.array(errors).T
+
+
+def in_parts(recordings: Sequence[Recording]) -> Iterator[Sequence[Recording]]:
+    for start in range(0, len(recordings), TOGETHER):
+        yield recordings[start : start + TOGETHER]
+
+
+def motionless_errors(recordings: Sequence[Recording]) -> NDArray[np.float64]:
+    """(R, 16) errors [m] of predicting that nothing moves."""
+    return np.array([distances(each, np.zeros((STEPS, 1, 3))) for each in recordings])
+
+
+def rigid_errors(recordings: Sequence[Recording]) -> NDArray[np.float64]:
+    """(R, 16) errors [m] of predicting that the cloth glides along under the picker as if it were rigid."""
+    steps = np.minimum(np.arange(1, STEPS + 1), PULL_STEPS)[:, None, None]
+    return np.array([distances(each, steps * each.step * np.array([1, 1, 0])) for each in recordings])
+
+
+def distances(recording: Recording, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(16,) mean distance [m] of the recorded positions from the first ones displaced by (16, 1, 3)."""
+    offset = recording.positions[1:] - recording.positions[0] - displacement
+    return np.linalg.norm(offset, axis=-1).mean(axis=1)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to measure."""
+
+    test: Path
+    """Data set of held-out garments."""
+    weights: Path = DEFAULT
+    visible_only: bool = False
+    """Show the model what the camera sees of the cloth, nothing else."""
+    at_most: int = 200
+    """Recordings per category."""
+
+
+def main(options: Options) -> None:
+    torch.set_num_threads(1)
+    model = load(options.weights)
+    by_category: dict[str, list[Recording]] = defaultdict(list)
+    for each in recordings(Dataset(options.test), model.preset, visible_only=options.visible_only):
+        by_category[each.category].append(each)
+    table = Table("category", "pulls", "model", "no motion", "rigid", title="error after 16 steps [mm], mean over nodes")
+    for category, found in by_category.items():
+        some = found[: options.at_most]
+        errors = [of[:, -1].mean() for of in (rollout_errors(model, some), motionless_errors(some), rigid_errors(some))]
+        table.add_row(category, str(len(some)), *(f"{1e3 * error:.1f}" for error in errors))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))
