@@ -1,6 +1,6 @@
 """What lies on the simulated table, and its figures. A scene is never changed: every action makes a new one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -27,6 +27,10 @@ MIN_COST_M = 0.001
 STATES: tuple[StartState, ...] = ("drop", "flat", "picks")
 
 
+Touch = Callable[[int, ClothState], ClothState]
+"""The cloth after something touched it at the end of a frame of the path, given the frame's number."""
+
+
 class Pulled(NamedTuple):
     """What came of a pull."""
 
@@ -34,6 +38,8 @@ class Pulled(NamedTuple):
     grasped: bool
     stopped: MedorError | None
     """Why it was cut short."""
+    walked: int
+    """Frames of the path."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +66,14 @@ class Scene:
         path = pull(pick, place)
         return self.carried(pick, path, np.ones(len(path), bool), check)
 
-    def carried(self, start: np.ndarray, path: np.ndarray, holding: np.ndarray, check: Callable[[], None]) -> "Pulled":
+    def carried(
+        self,
+        start: np.ndarray,
+        path: np.ndarray,
+        holding: np.ndarray,
+        check: Callable[[], None],
+        touches: Sequence[Touch] = (),
+    ) -> "Pulled":
         """The scene after the picker has walked a path, then opened, and the cloth has settled: one action.
 
         Args:
@@ -69,19 +82,23 @@ class Scene:
             holding: Whether it is closed in each frame (T,).
             check: May raise between slices of the walk to stop it: then the picker opens where it is, and the cloth
                 falls and settles.
+            touches: What else acts on the cloth, in this order after every frame.
         """
         engine = self.piece.engine
-        now, grasped, stopped = engine.placed(self.cloth, start), False, None
+        now, grasped, stopped, walked = engine.placed(self.cloth, start), False, None, 0
         try:
-            for begin in range(0, len(path), SLICE_FRAMES):
+            while walked < len(path):
                 check()
-                part = slice(begin, begin + SLICE_FRAMES)
+                part = slice(walked, walked + (1 if touches else SLICE_FRAMES))
                 now = engine.advance(now, len(path[part]), picker_path=path[part], holding=holding[part])
+                for touch in touches:
+                    now = touch(walked, now)
                 grasped |= now.held >= 0
+                walked += len(path[part])
         except MedorError as error:
             stopped = error
         now = engine.advance(now, SETTLE_FRAMES, settle_speed=SETTLED_SPEED)
-        return Pulled(replace(self, cloth=now, picks=self.picks + 1), grasped, stopped)
+        return Pulled(replace(self, cloth=now, picks=self.picks + 1), grasped, stopped, walked)
 
     def score(self) -> Score:
         """The referee's figures. An improvement is 0 where the start left no room for one."""
