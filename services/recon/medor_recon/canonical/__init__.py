@@ -1,0 +1,1 @@
+"""From a depth view to canonical coordinates at every pixel on the cloth."""
