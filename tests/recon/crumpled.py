@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from medor_cloth.camera import overhead
 from medor_cloth.garment import Garment, generate
@@ -62,3 +63,15 @@ def warped(rng: np.random.Generator, size: float) -> Completed:
     error = waves @ rng.standard_normal((6, 3))
     error *= size / np.sqrt((error**2).sum(axis=1).mean())
     return Completed(shirt.vertices, shirt.faces, (folded() + error).astype(np.float32))
+
+
+def filled(view: Canonicalized) -> Completed:
+    """The true shape, each vertex amid the points seen nearest to it in canonical space: what is hidden hangs behind.
+
+    The error is that of a completion which has learnt nothing.
+    """
+    shirt = garment()
+    distance, near = cKDTree(NOCS["tshirt"].decode(view.nocs)).query(shirt.vertices, k=8)
+    weights = 1 / (distance + 0.005) ** 2
+    positions = (weights[..., None] * view.points[near]).sum(axis=1) / weights.sum(axis=1, keepdims=True)
+    return Completed(shirt.vertices, shirt.faces, positions.astype(np.float32))

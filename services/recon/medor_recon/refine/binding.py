@@ -18,11 +18,6 @@ class Binding(NamedTuple):
     targets: NDArray[np.float64]
     """(n, 3) world frame [m]."""
 
-    def only(self, vertices: NDArray[np.integer]) -> "Binding":
-        """The part of it that binds these vertices (ids)."""
-        kept = np.isin(self.vertices, vertices)
-        return Binding(self.vertices[kept], self.targets[kept])
-
 
 def bind(
     vertices: NDArray[np.floating], nocs: NDArray[np.floating], points: NDArray[np.floating], reach: float

@@ -30,9 +30,6 @@ class RefineConfig:
     """Iterations between two looks at which vertices are visible."""
     reach: float = 2 / 64
     """Farthest observed cell that a vertex is bound to, in the NOCS cube."""
-    bind_hidden: bool = True
-    """Whether vertices hidden at the start are bound as well, as in the paper: those just behind the rim of what is
-    seen are then drawn out into view."""
 
 
 PAPER = RefineConfig()
@@ -40,3 +37,5 @@ JOINT = RefineConfig(phases=(Phase(iterations=100),))
 """Canonical coordinates hold to the end (MEDOR, ablation "joint optimization")."""
 NO_CONSISTENCY = RefineConfig(phases=(Phase(consistency=0.0), Phase(consistency=0.0)))
 """Canonical coordinates are not used (MEDOR, ablation "no consistency")."""
+HELD = RefineConfig(phases=(Phase(stretch=1.0), Phase(consistency=0.0, stretch=1.0)))
+"""With an edge prior: what moves takes its neighbours along, hidden ones too."""

@@ -88,8 +88,6 @@ class _Problem:
         self.camera, self.faces = canonicalized.camera, completed.faces
         self.points = canonicalized.points.astype(np.float64)
         self.binding = bind(box.encode(completed.canonical), canonicalized.nocs, self.points, config.reach)
-        if not config.bind_hidden:
-            self.binding = self.binding.only(visible(completed.positions, self.faces, self.camera))
         self.edges = _edges(completed.faces)
         first, second = completed.canonical[self.edges].astype(np.float64).swapaxes(0, 1)
         self.rest_lengths = np.linalg.norm(second - first, axis=1)
