@@ -26,7 +26,10 @@ SCORE = "score"
 class Task(Protocol):
     """What is learnt."""
 
-    module: nn.Module
+    @property
+    def module(self) -> nn.Module:
+        """The network, initialised, on the device to train on."""
+        ...
 
     def loss(self, step: int) -> Tensor:
         """Scalar to minimise, of a batch drawn from (seed, step) alone. torch's own generator is seeded by the loop."""

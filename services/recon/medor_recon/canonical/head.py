@@ -4,6 +4,7 @@ Bin b stands for the coordinate b / (bins - 1). A coordinate belongs to the near
 below, which pulls every prediction down by half a bin.
 """
 
+from itertools import pairwise
 from typing import Literal
 
 import torch
@@ -15,19 +16,28 @@ Decoding = Literal["mean", "mode"]
 
 
 class Head(nn.Module):
-    """Logits (..., 3, bins) of features (..., C)."""
+    """Logits (..., 3, bins) of features (..., C).
 
-    def __init__(self, channels: int, hidden: int, bins: int, normed: bool, dropout: float = 0.0) -> None:
+    Args:
+        widths: channels of the features and of each hidden layer.
+        bins: of each axis.
+        normed: normalise the hidden layers.
+        dropout: after each of them.
+    """
+
+    def __init__(self, *widths: int, bins: int, normed: bool = False, dropout: float = 0.0) -> None:
         super().__init__()
         self.bins = bins
-        self.hidden = nn.Linear(channels, hidden)
-        self.norm = nn.BatchNorm1d(hidden) if normed else nn.Identity()
-        self.dropout = nn.Dropout(dropout)
-        self.last = nn.Linear(hidden, 3 * bins)
+        hidden = [self._layer(before, after, normed, dropout) for before, after in pairwise(widths)]
+        self.layers = nn.Sequential(*hidden, nn.Linear(widths[-1], 3 * bins))
+
+    @staticmethod
+    def _layer(before: int, after: int, normed: bool, dropout: float) -> nn.Module:
+        norm = nn.BatchNorm1d(after) if normed else nn.Identity()
+        return nn.Sequential(nn.Linear(before, after), norm, nn.ReLU(inplace=True), nn.Dropout(dropout))
 
     def forward(self, features: Tensor) -> Tensor:
-        flat = features.reshape(-1, features.shape[-1])
-        logits = self.last(self.dropout(torch.relu(self.norm(self.hidden(flat)))))
+        logits = self.layers(features.reshape(-1, features.shape[-1]))
         return logits.reshape(*features.shape[:-1], 3, self.bins)
 
 
