@@ -146,5 +146,5 @@ def test_the_oracle_needs_a_simulator(real_lab):
 def test_a_wrong_category_or_method_is_said_so(lab):
     with pytest.raises(BadRequest, match="tshirt lies"):
         lab.bus.ask(endpoints.PLAN, ORACLE.model_copy(update={"category": "skirt"}))
-    with pytest.raises(BadRequest, match="visible, oracle, random"):
+    with pytest.raises(BadRequest, match="visible, oracle, oracle-mesh, random"):
         lab.bus.ask(endpoints.PLAN, ORACLE.model_copy(update={"method": "telepathy"}))

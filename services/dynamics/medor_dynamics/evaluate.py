@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from medor_cloth.dataset import Dataset
-from medor_dynamics.model import Dynamics
+from medor_dynamics.model import Dynamics, Predictor
 from medor_dynamics.preset import PULL_STEPS, STEPS
 from medor_dynamics.samples import Recording, recordings, stretches
 from medor_dynamics.shipped import DEFAULT, load
@@ -23,19 +23,22 @@ TOGETHER = 8
 
 
 @torch.inference_mode()
-def rollout_errors(model: Dynamics, recordings: Sequence[Recording]) -> NDArray[np.float64]:
+def rollout_errors(
+    model: Dynamics, recordings: Sequence[Recording], dtype: torch.dtype = torch.float32
+) -> NDArray[np.float64]:
     """(R, 16) distance of the nodes from where they were recorded, mean over nodes, after each step [m]."""
-    errors = [rolled for few in in_parts(recordings) for rolled in errors_of(model, few)]
+    predictor = model.predictor(dtype)
+    errors = [rolled for few in in_parts(recordings) for rolled in errors_of(predictor, few)]
     return np.array(errors)
 
 
-def errors_of(model: Dynamics, recordings: Sequence[Recording]) -> NDArray[np.float64]:
+def errors_of(predictor: Predictor, recordings: Sequence[Recording]) -> NDArray[np.float64]:
     """`rollout_errors` of a few recordings at once."""
     starts = [0] * len(recordings)
     batch = stretches(recordings, starts, [each.before(0) for each in recordings], STEPS)
     motion, errors = batch.motion, []
     for grip, target in zip(batch.grips, batch.targets, strict=True):
-        motion = model(batch.graphs, motion, grip)
+        motion = predictor(batch.graphs, motion, grip)
         distance = (motion.positions - target).norm(dim=1).numpy()
         errors.append(np.add.reduceat(distance, batch.graphs.starts[:-1]) / np.diff(batch.graphs.starts))
     return np.array(errors).T
@@ -57,7 +60,7 @@ def rigid_errors(recordings: Sequence[Recording]) -> NDArray[np.float64]:
     return np.array([distances(each, steps * each.step * np.array([1, 1, 0])) for each in recordings])
 
 
-def distances(recording: Recording, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+def distances(recording: Recording, displacement: NDArray) -> NDArray[np.float64]:
     """(16,) mean distance [m] of the recorded positions from the first ones displaced by (16, 1, 3)."""
     offset = recording.positions[1:] - recording.positions[0] - displacement
     return np.linalg.norm(offset, axis=-1).mean(axis=1)
@@ -82,7 +85,7 @@ def main(options: Options) -> None:
     by_category: dict[str, list[Recording]] = defaultdict(list)
     for each in recordings(Dataset(options.test), model.preset, visible_only=options.visible_only):
         by_category[each.category].append(each)
-    table = Table("category", "pulls", "model", "no motion", "rigid", title="error after 16 steps [mm], mean over nodes")
+    table = Table("category", "pulls", "model", "no motion", "rigid", title="mean error after 16 steps [mm]")
     for category, found in by_category.items():
         some = found[: options.at_most]
         errors = [of[:, -1].mean() for of in (rollout_errors(model, some), motionless_errors(some), rigid_errors(some))]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from medor_dynamics.evaluate import motionless_errors, rigid_errors, rollout_errors
 from medor_dynamics.model import Dynamics, edge_features, injected, node_features
@@ -17,10 +17,9 @@ FITTED_ON = 32
 class Foresight:
     """A task of `medor_learn`: the score is the error after 16 steps on garments held out [m]."""
 
-    module: Dynamics
-
     def __init__(self, model: Dynamics, sampler: Sampler, held_out: Sequence[Recording]) -> None:
-        self.module = model
+        self.module: nn.Module = model
+        self._model = model
         self._sampler = sampler
         self._held_out = held_out
         if model.preset.normalize:
@@ -33,16 +32,16 @@ class Foresight:
         goes: its acceleration is neither used nor learnt.
         """
         batch = self._sampler.draw(step)
-        unit = self.module.normalizer.acceleration_scale * STEP_S**2
+        unit = self._model.normalizer.acceleration_scale * STEP_S**2
         motion, squares = batch.motion, []
         for grip, target in zip(batch.grips, batch.targets, strict=True):
-            motion = self.module(batch.graphs, motion, grip)
+            motion = self._model(batch.graphs, motion, grip)
             squares.append(((motion.positions - target) / unit).square().mean())
         return torch.stack(squares).mean()
 
     def validate(self) -> dict[str, float]:
         """Mean over held-out pulls, beside the errors of two predictions that take no learning [m]."""
-        errors = rollout_errors(self.module, self._held_out)
+        errors = rollout_errors(self._model, self._held_out)
         return {
             "score": float(errors[:, -1].mean()),
             "first_step": float(errors[:, 0].mean()),

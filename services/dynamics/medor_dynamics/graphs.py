@@ -12,6 +12,9 @@ from torch import Tensor
 from medor_dynamics.neighbors import NO_SLOT, edges_of
 from medor_dynamics.preset import Preset
 
+FAR_M = 1e3
+"""Where nodes without a place are looked for [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Wiring:
@@ -86,10 +89,13 @@ class Graphs:
         return len(self.starts) - 1
 
     def wire(self, positions: Tensor, preset: Preset) -> Wiring:
-        """The edges for nodes that lie at positions (N, 3) [m]. The search itself runs on the CPU."""
+        """The edges for nodes that lie at positions (N, 3) [m]. The search itself runs on the CPU.
+
+        A graph whose nodes left the finite numbers has edges too, though of no meaning: the others must go on.
+        """
         device = positions.device
         senders, receivers, slots = edges_of(
-            positions.detach().cpu().numpy(),
+            positions.detach().nan_to_num().clamp(-FAR_M, FAR_M).cpu().numpy(),
             self.starts,
             self.mesh_starts,
             self.mesh_senders,

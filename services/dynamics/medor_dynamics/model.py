@@ -1,5 +1,7 @@
 """The dynamics model: from cloth and the picker's move to the cloth one step later (MEDOR, dynamics model)."""
 
+from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Self
 
@@ -8,6 +10,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from medor_dynamics.graphs import Graphs, Wiring
+from medor_dynamics.lean import LeanNetwork
 from medor_dynamics.network import GraphNetwork
 from medor_dynamics.normalizer import Normalizer
 from medor_dynamics.preset import HISTORY, STEP_S, Preset
@@ -44,7 +47,7 @@ class Grip:
 
 
 class Dynamics(nn.Module):
-    """A graph network with its normalizer, and the integration around them."""
+    """A graph network with its normalizer: what is learnt."""
 
     def __init__(self, preset: Preset) -> None:
         super().__init__()
@@ -53,6 +56,26 @@ class Dynamics(nn.Module):
         self.normalizer = Normalizer()
 
     def forward(self, graphs: Graphs, motion: Motion, grip: Grip) -> Motion:
+        """The nodes one step later."""
+        return Predictor(self.preset, self.normalizer, self.network)(graphs, motion, grip)
+
+    def predictor(self, dtype: torch.dtype = torch.float32) -> "Predictor":
+        """The model as it is now, made ready for rollouts on its device, hidden values in a precision."""
+        on_cpu = self.normalizer.node_scale.device.type == "cpu"
+        network = LeanNetwork(self.network, dtype) if on_cpu else deepcopy(self.network).to(dtype)
+        return Predictor(self.preset, self.normalizer, network, dtype)
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """One step of cloth: features in, the network's accelerations integrated."""
+
+    preset: Preset
+    normalizer: Normalizer
+    network: Callable[[Tensor, Tensor, Wiring], Tensor]
+    dtype: torch.dtype = torch.float32
+
+    def __call__(self, graphs: Graphs, motion: Motion, grip: Grip) -> Motion:
         """The nodes one step later. A held node moves exactly as its picker does."""
         moved = injected(motion, grip)
         return integrated(moved, self.acceleration(graphs, moved, grip), grip)
@@ -62,8 +85,7 @@ class Dynamics(nn.Module):
         wiring = graphs.wire(moved.positions, self.preset)
         nodes = self.normalizer.nodes(node_features(moved, grip))
         edges = self.normalizer.edges(edge_features(moved.positions, wiring))
-        dtype = self.network.decode[0].weight.dtype
-        out = self.network(nodes.to(dtype), edges.to(dtype), wiring)
+        out = self.network(nodes.to(self.dtype), edges.to(self.dtype), wiring)
         return out.float() * self.normalizer.acceleration_scale
 
 

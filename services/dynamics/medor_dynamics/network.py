@@ -45,6 +45,7 @@ class Block(nn.Module):
     def __init__(self, width: int, global_vector: bool) -> None:
         super().__init__()
         reads = 1 if global_vector else 0
+        self.width = width
         self.edge = mlp((3 + reads) * width, width, width)
         self.node = mlp((2 + reads) * width, width, width)
         self.shared = mlp(3 * width, width, width) if global_vector else None
@@ -56,14 +57,15 @@ class Block(nn.Module):
         nodes_out = self.node(torch.cat([nodes, received, *own], dim=1))
         if self.shared is None:
             return nodes_out, edges_out, shared
-        seen = [shared, mean_over(nodes_out, wiring.graph_of, wiring), mean_over(edges_out, edge_graphs(wiring), wiring)]
-        return nodes_out, edges_out, self.shared(torch.cat(seen, dim=1))
+        of_nodes = mean_over(nodes_out, wiring.graph_of, wiring)
+        of_edges = mean_over(edges_out, edge_graphs(wiring), wiring)
+        return nodes_out, edges_out, self.shared(torch.cat([shared, of_nodes, of_edges], dim=1))
 
     def _first_edge_layer(self, nodes: Tensor, edges: Tensor, shared: Tensor, wiring: Wiring) -> Tensor:
         """The layer over (receiver, sender, edge, global), each part projected where there is fewest of it."""
         layer = self.edge[0]
         assert isinstance(layer, nn.Linear)
-        receiver, sender, edge, *of_shared = layer.weight.split(nodes.shape[1], dim=1)
+        receiver, sender, edge, *of_shared = layer.weight.split(self.width, dim=1)
         received = F.linear(nodes, receiver)
         if of_shared:
             received = received + F.linear(shared, of_shared[0])[wiring.graph_of]

@@ -43,7 +43,9 @@ class NodeMesh:
 
     @classmethod
     def over(cls, rest_shape: NDArray[np.float32], ids: NDArray[np.int32], edges: NDArray[np.int32]) -> Self:
-        distance, neighbors = KDTree(rest_shape[ids]).query(rest_shape, k=range(1, min(BLENDED, len(ids)) + 1))
+        nearest = min(BLENDED, len(ids))
+        distance, neighbors = KDTree(rest_shape[ids]).query(rest_shape, k=nearest)
+        distance, neighbors = np.reshape(distance, (-1, nearest)), np.reshape(neighbors, (-1, nearest))
         weights = 1 / np.maximum(distance, 1e-6) ** 2
         weights /= weights.sum(axis=1, keepdims=True)
         return cls(ids, edges, rest_shape, neighbors.astype(np.int64), weights.astype(np.float32))

@@ -7,9 +7,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
-from torch import Tensor, nn
+from torch import Tensor
 
 from medor_dynamics.model import Dynamics
+from medor_dynamics.network import Block
 from medor_dynamics.preset import HISTORY, PULL_STEPS, STEP_S, STEPS, Preset
 
 
@@ -36,7 +37,8 @@ def roll_out_plainly(
             shifted = [step / STEP_S, *(velocity[node] for velocity in history[:-1])]
             history = [torch.where(held[:, None], new, old) for new, old in zip(shifted, history, strict=True)]
         velocity = history[0] + STEP_S * accelerations(model, x, history, held, edges, rest)
-        history = [torch.where(held[:, None], old, new) for old, new in zip(history, [velocity, *history], strict=False)]
+        shifted = [velocity, *history[:-1]]
+        history = [torch.where(held[:, None], old, new) for old, new in zip(history, shifted, strict=True)]
         x = torch.where(held[:, None], x, x + STEP_S * velocity)
     return (x.numpy() @ to_model).astype(np.float32)
 
@@ -60,6 +62,7 @@ def accelerations(
     messages = network.encode_edges((edge.float() - norm.edge_mean) / norm.edge_scale)
     shared = torch.zeros(network.width)
     for block in network.blocks:
+        assert isinstance(block, Block)
         nodes_in = nodes
         nodes_out, messages_out, shared_out = pass_messages(block, nodes, messages, shared, senders, receivers)
         nodes, messages, shared = nodes_in + nodes_out, messages + messages_out, shared + shared_out
@@ -67,7 +70,7 @@ def accelerations(
 
 
 def pass_messages(
-    block: nn.Module, nodes: Tensor, messages: Tensor, shared: Tensor, senders: Tensor, receivers: Tensor
+    block: Block, nodes: Tensor, messages: Tensor, shared: Tensor, senders: Tensor, receivers: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
     """One block's output: nodes, messages and global vector."""
     to_all = [shared.expand(len(messages), -1)] if block.shared is not None else []

@@ -38,8 +38,6 @@ class Preset:
 
 
 PAPER = Preset()
-CPU = Preset(
-    width=64, blocks=5, global_vector=False, nearest=8, close_mesh_edges=False, frame="pull", normalize=True
-)
+CPU = Preset(width=64, blocks=5, global_vector=False, nearest=8, close_mesh_edges=False, frame="pull", normalize=True)
 """Small enough for 500 rollouts in seconds on two cores."""
 PRESETS = {"paper": PAPER, "cpu": CPU}

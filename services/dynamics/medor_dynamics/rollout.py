@@ -12,7 +12,7 @@ from torch import Tensor
 
 from medor_dynamics.frame import headings, turned
 from medor_dynamics.graphs import Graphs
-from medor_dynamics.model import Dynamics, Grip, Motion
+from medor_dynamics.model import Grip, Motion, Predictor
 from medor_dynamics.preset import PULL_STEPS, STEPS
 
 CHUNK = 4
@@ -34,7 +34,7 @@ class Pulls:
 
 
 def roll_out(
-    model: Dynamics,
+    predictor: Predictor,
     graph: Graphs,
     positions: NDArray[np.float32],
     pulls: Pulls,
@@ -47,7 +47,7 @@ def roll_out(
     """Nodes after each pull and the fall that follows it (K, n, 3) [m].
 
     Args:
-        model: weights and conventions; runs on the device and in the precision of its network.
+        predictor: the model, made ready for its device.
         graph: of the mesh.
         positions: (n, 3) nodes before the action, at rest [m].
         pulls: the candidates.
@@ -63,7 +63,7 @@ def roll_out(
 
     def roll(part: slice) -> int:
         check()
-        after[part] = roll_chunk(model, batches[part.stop - part.start], positions, pulls[part])
+        after[part] = roll_chunk(predictor, batches[part.stop - part.start], positions, pulls[part])
         return part.stop - part.start
 
     with ThreadPoolExecutor(threads, initializer=partial(torch.set_num_threads, 1)) as pool:
@@ -79,16 +79,16 @@ def roll_out(
 
 @torch.inference_mode()
 def roll_chunk(
-    model: Dynamics, graphs: Graphs, positions: NDArray[np.float32], pulls: Pulls
+    predictor: Predictor, graphs: Graphs, positions: NDArray[np.float32], pulls: Pulls
 ) -> NDArray[np.float32]:
     """Nodes after each of a few pulls (K, n, 3) [m]; `graphs` is the mesh's graph once for each."""
-    angles = headings(pulls.displacements, model.preset)
-    device = model.normalizer.node_scale.device
+    angles = headings(pulls.displacements, predictor.preset)
+    device = predictor.normalizer.node_scale.device
     motion = Motion.resting(torch.from_numpy(turned(positions, -angles)).reshape(-1, 3).to(device))
     nodes = torch.from_numpy(pulls.nodes + graphs.starts[:-1]).to(device)
     steps = torch.from_numpy(turned(pulls.displacements[:, None] / PULL_STEPS, -angles)[:, 0]).to(device)
     for grip in grips(nodes, steps):
-        motion = model(graphs, motion, grip)
+        motion = predictor(graphs, motion, grip)
     return turned(motion.positions.reshape(len(pulls), *positions.shape).cpu().numpy(), angles)
 
 

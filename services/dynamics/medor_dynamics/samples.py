@@ -157,11 +157,18 @@ class Sampler:
 
 
 def stretches(
-    recordings: Sequence[Recording], firsts: Sequence[int], windows: Sequence[NDArray[np.float32]], steps: int
+    recordings: Sequence[Recording],
+    firsts: Sequence[int] | NDArray[np.int64],
+    windows: Sequence[NDArray[np.float32]],
+    steps: int,
+    firsts: Sequence[int] | NDArray[np.int64],
+    windows: Sequence[NDArray[np.float32]],
+    steps: int,
 ) -> Batch:
     """A batch from histories (6, n, 3), one per recording. Only errors of velocity are to be put right: a history
     that ends beside the recorded positions has targets that lie beside them as far."""
-    graphs = Graphs.of([each.positions.shape[1] for each in recordings], *zip(*((r.edges, r.rest) for r in recordings)))
+    sizes = [each.positions.shape[1] for each in recordings]
+    graphs = Graphs.of(sizes, [each.edges for each in recordings], [each.rest for each in recordings])
     velocities = np.concatenate([np.diff(window, axis=0)[::-1].swapaxes(0, 1) for window in windows]) / STEP_S
     targets = [
         each.positions[first + 1 : first + steps + 1] + (window[-1] - each.positions[first])
@@ -177,7 +184,7 @@ def stretches(
 
 def grip_at(recordings: Sequence[Recording], records: NDArray[np.int64], graphs: Graphs) -> Grip:
     """What the pickers do after the given record of each recording."""
-    pulled = np.flatnonzero(records < PULL_STEPS)
+    pulled = np.flatnonzero(records < PULL_STEPS).tolist()
     nodes = np.array([recordings[k].node + graphs.starts[k] for k in pulled], np.int64)
     steps = np.array([recordings[k].step for k in pulled], np.float32).reshape(-1, 3)
     return Grip(torch.from_numpy(nodes), torch.from_numpy(steps))

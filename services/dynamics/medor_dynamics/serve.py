@@ -4,14 +4,22 @@ Stateless: any number of replicas share the candidates of one plan.
 """
 
 import os
+from pathlib import Path
+from typing import Literal
+
+import torch
 
 from medor_dynamics.flatten import Flattener
+from medor_dynamics.learned import learned
 from medor_dynamics.physics import Physics
 from medor_dynamics.roller import Roller
+from medor_dynamics.shipped import DEFAULT
 from medor_dynamics.warm_up import warm_up
 from medor_wire import endpoints
 from medor_wire.bus import join
 from medor_wire.config import Settings
+
+PRECISIONS = {"bfloat16": torch.bfloat16, "float32": torch.float32}
 
 
 class Config(Settings, section="dynamics"):
@@ -19,11 +27,18 @@ class Config(Settings, section="dynamics"):
     """Threads of one rollout request; 0: this replica's share of all processors."""
     replicas: int = 1
     """Replicas on this machine, which share its processors."""
+    weights: Path = DEFAULT
+    """Folder of the learned model, as training leaves it in `best`."""
+    precision: Literal["bfloat16", "float32"] = "bfloat16"
+    """Of the learned model's hidden values."""
 
 
 def main(config: Config) -> None:
     threads = config.threads or -(-(os.cpu_count() or 1) // config.replicas)
-    roller = Roller({"physics": Physics(threads)})
+    torch.set_num_threads(1)
+    roller = Roller(
+        {"physics": Physics(threads), "learned": learned(config.weights, threads, PRECISIONS[config.precision])}
+    )
     with join("dynamics", config.bus) as bus:
         bus.ready(False, "compiling")
         bus.serve(endpoints.ROLLOUT, roller.roll_out)

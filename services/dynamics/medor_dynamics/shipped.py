@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from medor_dynamics.model import Dynamics
 from medor_dynamics.preset import Preset
 from medor_learn import weights
@@ -13,15 +11,14 @@ DEFAULT = Path(__file__).parent / "weights" / "cpu"
 """The weights that come with this package."""
 
 
-def load(folder: Path, device: str = "cpu", dtype: torch.dtype = torch.float32) -> Dynamics:
-    """The model of a folder written by training, its network on a device and in a precision.
+def load(folder: Path, device: str = "cpu") -> Dynamics:
+    """The model of a folder written by training, on a device.
 
     Raises:
         WeightsError: there is none, or it does not fit.
     """
     model, _ = weights.load(folder, build, device)
     assert isinstance(model, Dynamics)
-    model.network.to(dtype)
     return model
 
 

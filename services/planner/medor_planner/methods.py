@@ -24,10 +24,12 @@ VISIBLE = Method("visible", recon="visible", dynamics="physics")
 """Only what the camera sees, rolled out by the cloth solver."""
 ORACLE = Method("oracle", recon=None, dynamics="physics", goals="mesh")
 """The true mesh, rolled out by the cloth solver: the upper bound (MEDOR, ablations). Simulation only."""
+ORACLE_MESH = Method("oracle-mesh", recon=None, dynamics="learned", goals="mesh")
+"""The true mesh, rolled out by the learned model: what reconstruction costs (MEDOR, ablations). Simulation only."""
 RANDOM = Method("random", recon="visible", dynamics=None)
 """A pick near the outline, a place off the cloth (MEDOR, robot baseline)."""
 
-METHODS = {method.name: method for method in (VISIBLE, ORACLE, RANDOM)}
+METHODS = {method.name: method for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM)}
 
 
 def method_named(name: str) -> Method:
