@@ -23,7 +23,7 @@ from medor_wire.cell import Cell, serve_cell
 from medor_wire.lease import Lessor
 from medor_wire.ledger import Ledger
 from medor_wire.local_bus import LocalBus
-from medor_wire.messages import ActRequest, LeaseRequest, ResetRequest
+from medor_wire.messages import ActRequest, Executor, LeaseRequest, ResetRequest
 from medor_wire.motion import Motion
 
 
@@ -34,13 +34,20 @@ class Exam:
     ask: LocalBus
     server: LocalBus
     ledger: Ledger
+    executor: Executor = "picker"
 
     def acquire(self, holder: str | None = None) -> int:
         request = LeaseRequest(holder=holder or self.ask.presence)
         return self.ask.ask(endpoints.LEASE, request).epoch
 
     def act(self, action_id: str, epoch: int, place=(0.05, 0.05, 0.1)):
-        request = ActRequest(action_id=action_id, epoch=epoch, pick=np.array([0.0, 0.0, 0.02]), place=np.array(place))
+        request = ActRequest(
+            action_id=action_id,
+            epoch=epoch,
+            pick=np.array([0.0, 0.0, 0.02]),
+            place=np.array(place),
+            executor=self.executor,
+        )
         return self.ask.ask(endpoints.ACT, request)
 
 
@@ -63,7 +70,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory, wardrobe: Wardrobe) -> P
     return folder
 
 
-@pytest.fixture(params=["sim", "robot"])
+@pytest.fixture(params=["sim", "sim by the arm", "robot"])
 def exam(
     request: pytest.FixtureRequest, tmp_path: Path, wardrobe: Wardrobe, recording: Path, simulator: Callable
 ) -> Iterator[Exam]:
@@ -72,13 +79,13 @@ def exam(
     # The exam is about what a lease guards, not about renewing it in time on a busy machine.
     motion = Motion(ledger, Lessor(ledger, ttl_s=60))
     cell: Cell
-    if request.param == "sim":
+    if request.param != "robot":
         cell = simulator(motion, server)
     else:
         cell = Driver(motion, DryRunArm(), ReplayCamera(recording), Workspace(), server.publish)
     serve_cell(server, cell, motion.lessor)
     asker = server.connect("planner")
-    yield Exam(asker, server, ledger)
+    yield Exam(asker, server, ledger, "panda" if request.param == "sim by the arm" else "picker")
     asker.close()
     server.close()
     ledger.close()

@@ -48,8 +48,12 @@ def test_capture_shows_cloth_from_above(exam):
 
 def test_reach_agrees_with_what_act_refuses(exam):
     inside, outside = [0.05, 0.05, 0.1], [1.5, 0.0, 0.1]
-    answer = exam.ask.ask(endpoints.REACH, ReachRequest(points=np.array([inside, outside], np.float32)))
-    assert answer.reachable.tolist() == [True, False]
+    points = np.array([inside, outside, inside], np.float32)
+    places = np.array([inside, inside, outside], np.float32)
+    answer = exam.ask.ask(endpoints.REACH, ReachRequest(points=points, executor=exam.executor))
+    assert answer.reachable.tolist() == [True, False, True]
+    answer = exam.ask.ask(endpoints.REACH, ReachRequest(points=points, places=places, executor=exam.executor))
+    assert answer.reachable.tolist() == [True, False, False]
     epoch = exam.acquire()
     assert exam.act("near", epoch, place=inside).action_id == "near"
     with pytest.raises(OutOfReach, match="place"):

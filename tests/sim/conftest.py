@@ -1,6 +1,7 @@
 """A simulated cell without a bus."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from medor_sim.world import World
 from medor_wire.bus import Call
 from medor_wire.lease import Lessor
 from medor_wire.ledger import Ledger
-from medor_wire.messages import ActOutcome, ActRequest, Empty, LeaseRequest, ResetRequest, Score
+from medor_wire.messages import ActOutcome, ActRequest, Empty, Executor, LeaseRequest, ResetRequest, Score
 from medor_wire.motion import Motion
 
 CATEGORY, SEED = "skirt", 800001
@@ -37,9 +38,11 @@ class Bench:
     def positions(self) -> np.ndarray:
         return self.simulator.truth(Empty(), Call()).mesh.vertices
 
-    def act(self, action_id: str, pick, place, call: Call | None = None) -> ActOutcome:
+    def act(self, action_id: str, pick, place, call: Call | None = None, executor: Executor = "picker") -> ActOutcome:
         epoch = self.lessor.lease(LeaseRequest(holder="test/1"), Call()).epoch
-        request = ActRequest(action_id=action_id, epoch=epoch, pick=np.asarray(pick), place=np.asarray(place))
+        request = ActRequest(
+            action_id=action_id, epoch=epoch, pick=np.asarray(pick), place=np.asarray(place), executor=executor
+        )
         return self.simulator.act(request, call or Call())
 
 
@@ -57,10 +60,9 @@ def world() -> Iterator[World]:
 
 @pytest.fixture
 def bench(tmp_path: Path, wardrobe: Wardrobe) -> Iterator[Bench]:
-    ledger = Ledger(tmp_path / "ledger.sqlite")
-    lessor = Lessor(ledger)
-    told: list[tuple[str, object]] = []
-    simulator = Simulator(Motion(ledger, lessor), wardrobe, lambda topic, message: told.append((topic.name, message)))
-    yield Bench(simulator, lessor, told)
-    simulator.close()
-    ledger.close()
+    with closing(Ledger(tmp_path / "ledger.sqlite")) as ledger:
+        lessor = Lessor(ledger, ttl_s=60)  # nobody renews it here
+        told: list[tuple[str, object]] = []
+        motion = Motion(ledger, lessor)
+        with closing(Simulator(motion, wardrobe, lambda topic, message: told.append((topic.name, message)))) as cell:
+            yield Bench(cell, lessor, told)

@@ -8,8 +8,12 @@ import numpy as np
 from medor_cloth.errors import ClothError
 from medor_cloth.picker import pull
 from medor_cloth.raster import rasterize
-from medor_sim.reach_map import TOLERANCE_M, ReachMap
-from medor_sim.scene import Scene
+from medor_sim.grasp_failures import Grasp, GraspFailures
+from medor_sim.panda import Motion as ArmMotion
+from medor_sim.panda import plan
+from medor_sim.picking import by_panda, by_picker
+from medor_sim.reach_map import ReachMap
+from medor_sim.scene import Pulled, Scene
 from medor_sim.wardrobe import Wardrobe
 from medor_sim.world import World
 from medor_wire import endpoints
@@ -33,12 +37,21 @@ class Simulator:
         motion: gate of everything that moves.
         wardrobe: where garments come from.
         tell: called with what observers may watch, after every change.
+        failures: how often grasps fail.
     """
 
-    def __init__(self, motion: Motion, wardrobe: Wardrobe | None = None, tell: Tell = _nobody) -> None:
+    def __init__(
+        self,
+        motion: Motion,
+        wardrobe: Wardrobe | None = None,
+        tell: Tell = _nobody,
+        failures: GraspFailures | None = None,
+    ) -> None:
         self._motion = motion
         self._wardrobe = wardrobe or Wardrobe()
         self._tell = tell
+        self._failures = failures or GraspFailures()
+        self._planned: ArmMotion | None = None
         self._world = World()
         self._reach_map = ReachMap(self._world.arm)
         self._scene: Scene | None = None
@@ -65,14 +78,18 @@ class Simulator:
         return self._motion.status("sim", category=category, camera=self._camera_info)
 
     def reach(self, request: m.ReachRequest, call: Call) -> m.Reach:
-        return m.Reach(reachable=self._reach_map.reachable(request.points))
+        """What `act` would not refuse. The flying picker only asks that the joints allow both ends."""
+        picks, places = request.points, request.points if request.places is None else request.places
+        if request.executor == "panda":
+            return m.Reach(reachable=self._reach_map.can_pull(picks, places))
+        return m.Reach(reachable=self._reach_map.reachable(picks) & self._reach_map.reachable(places))
 
     def act(self, request: m.ActRequest, call: Call) -> m.ActOutcome:
-        """One pick-and-place; the arm follows the flying picker as well as it can.
+        """One pick-and-place, by the flying picker or by the arm.
 
         Raises:
-            OutOfReach: the pick or the place; nothing has moved.
-            Refused: nothing lies on the table, or what `Motion.act` says.
+            OutOfReach: the pick, the place or, for the arm, the way between them; nothing has moved.
+            Refused: the arm would collide, nothing lies on the table, or what `Motion.act` says; nothing has moved.
         """
         try:
             outcome = self._motion.act(request, call, allow=self._allow, move=self._move)
@@ -126,29 +143,54 @@ class Simulator:
         return self._scene
 
     def _allow(self, request: m.ActRequest) -> None:
+        """Plan what the arm would do, or see that the picker may."""
         self._require_scene()
-        ends = {"pick": request.pick, "place": request.place}
-        reachable = self._reach_map.reachable(np.stack(list(ends.values())))
-        for (name, point), within in zip(ends.items(), reachable, strict=True):
-            if not within:
+        if request.executor == "panda":
+            self._planned = plan(self._world.arm, request.pick, request.place)
+            return
+        self._planned = None
+        for name, point in (("pick", request.pick), ("place", request.place)):
+            if not self._reach_map.reachable(point[None])[0]:
                 raise OutOfReach(f"{name}: the arm cannot bring its tool to {point.round(4).tolist()} m")
 
     def _move(self, request: m.ActRequest, check: Check) -> m.ActOutcome:
         start = time.perf_counter()
         self._tell(endpoints.CELL, self.status(m.Empty(), Call()))
-        pulled = self._require_scene().pulled(request.pick, request.place, check)
-        short = self._world.arm.follow(pull(request.pick, request.place))
-        self._world.arm.park()
+        scene, planned = self._require_scene(), self._planned
+        grasp = self._failures.draw(scene.picks, request.pick, request.place)
+        if planned is None:
+            pulled = by_picker(scene, request.pick, request.place, grasp, check)
+        else:
+            pulled = by_panda(scene, planned, grasp, check)
+            self._stand(planned, pulled)
         self._scene = pulled.scene
         if pulled.stopped is not None:
             raise pulled.stopped
         return m.ActOutcome(
             action_id=request.action_id,
             grasped=pulled.grasped,
-            arm_reached=short < TOLERANCE_M,
+            arm_reached=planned is not None or self._follows(request),
             seconds=time.perf_counter() - start,
+            detail=_said(planned, grasp),
         )
+
+    def _follows(self, request: m.ActRequest) -> bool:
+        """Whether the arm could have followed the flying picker."""
+        return bool(self._reach_map.reachable(pull(request.pick, request.place)).all())
+
+    def _stand(self, planned: ArmMotion, pulled: Pulled) -> None:
+        """Leave the arm where its motion ended, or was stopped."""
+        last = len(planned.joints) - 1 if pulled.stopped is None else pulled.walked - 1
+        self._world.arm.move_to(planned.joints[last], planned.openings[last])
 
     def _tell_scene(self) -> None:
         self._tell(endpoints.DEPTH, self.capture(m.Empty(), Call()))
         self._tell(endpoints.CELL, self.status(m.Empty(), Call()))
+
+
+def _said(planned: ArmMotion | None, grasp: Grasp) -> str:
+    """What an outcome has to add."""
+    words = [] if grasp == "good" else [f"grasp: {grasp}"]
+    if planned is not None:
+        words.append(f"arm: {planned.seconds:.2f} s, pull stretched {planned.stretch:.2f} times")
+    return "; ".join(words)

@@ -21,14 +21,14 @@ class World:
     def __init__(self) -> None:
         self._client = BulletClient(pybullet.DIRECT)
         self._client.setAdditionalSearchPath(pybullet_data.getDataPath())
-        self._add_table()
+        table = self._add_table()
         panda = self._client.loadURDF("franka_panda/panda.urdf", ARM_BASE_M, useFixedBase=True)
-        self.arm = Arm(self._client, panda, ARM_BASE_M)
+        self.arm = Arm(self._client, panda, table, ARM_BASE_M)
         self.camera = overhead()
 
-    def _add_table(self) -> None:
+    def _add_table(self) -> int:
         shape = self._client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=TABLE_HALF_SIZE_M)
-        self._client.createMultiBody(0, shape, basePosition=(0, 0, -TABLE_HALF_SIZE_M[2]))
+        return self._client.createMultiBody(0, shape, basePosition=(0, 0, -TABLE_HALF_SIZE_M[2]))
 
     def close(self) -> None:
         self._client.disconnect()
