@@ -13,12 +13,15 @@ _CRUSHED, _TORN = np.float32(0.5), np.float32(1.12)
 Whole cloth is never so distorted. Only in a tangle do contacts pull faces out of shape; letting go of them lets the
 layers slip apart, where pushing on would tear the tangle wider.
 """
-_RIM = np.float32(-0.02)
-"""How far outside a triangle, in barycentric weight, a point still counts as over it."""
+_RIM = np.float32(-0.15)
+"""How far outside a triangle, in barycentric weight, a point still touches it, ever less: a point that slides over the
+rim of a triangle must not be thrown out by a whole thickness at once."""
 
 
 @kernel
-def part_layers(x, before, inverse_mass, faces, areas, squares, starts, near, thickness, friction, push_out):
+def part_layers(
+    x, before, inverse_mass, faces, areas, squares, starts, near, thickness, friction, push_out, corners, weights
+):
     """Pushes every point closer than the thickness to a triangle back to the side it was on before this substep.
 
     The side is never remembered longer, so that a tangle is not locked in.
@@ -35,7 +38,13 @@ def part_layers(x, before, inverse_mass, faces, areas, squares, starts, near, th
         thickness: Distance kept between layers [m].
         friction: Coulomb coefficient between layers.
         push_out: Largest separating motion in one substep [m].
+        corners: Written: the vertices i, j, a, b, c of every contact that pushed (N,5).
+        weights: Written: barycentric weights of the triangle's corners and the normal of every such contact (N,6).
+
+    Returns:
+        Number of contacts that pushed.
     """
+    n = 0
     for t in range(len(faces)):
         if starts[t] == starts[t + 1]:
             continue
@@ -65,10 +74,11 @@ def part_layers(x, before, inverse_mass, faces, areas, squares, starts, near, th
             lc = ((uy * gz - uz * gy) * nx + (uz * gx - ux * gz) * ny + (ux * gy - uy * gx) * nz) * unit
             lb = ((gy * vz - gz * vy) * nx + (gz * vx - gx * vz) * ny + (gx * vy - gy * vx) * nz) * unit
             la = _ONE - lb - lc
-            if la < _RIM or lb < _RIM or lc < _RIM:
+            beyond = min(la, min(lb, lc))
+            if beyond < _RIM:
                 continue
             side = _side(before, a, b, c, i, j)
-            depth = thickness - s * side
+            depth = thickness * min(_ONE, _ONE - beyond / _RIM) - s * side
             # Motion of the point relative to the triangle during this substep: normal part, then tangential.
             wx = px - _HALF * (before[i, 0] + before[j, 0])
             wy = py - _HALF * (before[i, 1] + before[j, 1])
@@ -104,11 +114,50 @@ def part_layers(x, before, inverse_mass, faces, areas, squares, starts, near, th
             ax, ay, az = ax - wa * dx, ay - wa * dy, az - wa * dz
             bx, by, bz = bx - wb * dx, by - wb * dy, bz - wb * dz
             cx, cy, cz = cx - wc * dx, cy - wc * dy, cz - wc * dz
+            corners[n, 0], corners[n, 1], corners[n, 2], corners[n, 3], corners[n, 4] = i, j, a, b, c
+            weights[n, 0], weights[n, 1], weights[n, 2] = la, lb, lc
+            weights[n, 3], weights[n, 4], weights[n, 5] = nx, ny, nz
+            n += 1
             touched = True
         if touched:
             x[a, 0], x[a, 1], x[a, 2] = ax, ay, az
             x[b, 0], x[b, 1], x[b, 2] = bx, by, bz
             x[c, 0], x[c, 1], x[c, 2] = cx, cy, cz
+    return n
+
+
+@kernel
+def damp_contacts(v, inverse_mass, corners, weights, n, share):
+    """Takes a share of the relative velocity along the normal of every contact away; momentum is kept.
+
+    Layers that lie on each other would otherwise tremble between springs that press and contacts that push.
+
+    Args:
+        v: Velocities (V,3) [m/s], changed in place.
+        inverse_mass: (V,), 0 for a held vertex.
+        corners: Vertices i, j, a, b, c of the contacts (N,5).
+        weights: Barycentric weights of the triangle's corners and the normal (N,6).
+        n: Number of contacts.
+        share: Share taken away.
+    """
+    for k in range(n):
+        i, j, a, b, c = corners[k, 0], corners[k, 1], corners[k, 2], corners[k, 3], corners[k, 4]
+        la, lb, lc = weights[k, 0], weights[k, 1], weights[k, 2]
+        wi, wj = _HALF * inverse_mass[i], _HALF * inverse_mass[j]
+        wa, wb, wc = inverse_mass[a] * la, inverse_mass[b] * lb, inverse_mass[c] * lc
+        total = wa * la + wb * lb + wc * lc + (inverse_mass[i] if i == j else _HALF * (wi + wj))
+        rate = _ZERO
+        for axis in range(3):
+            triangle = la * v[a, axis] + lb * v[b, axis] + lc * v[c, axis]
+            rate += weights[k, 3 + axis] * (_HALF * (v[i, axis] + v[j, axis]) - triangle)
+        rate *= share / (total + np.float32(1e-9))
+        for axis in range(3):
+            change = rate * weights[k, 3 + axis]
+            v[i, axis] -= wi * change
+            v[j, axis] -= wj * change
+            v[a, axis] += wa * change
+            v[b, axis] += wb * change
+            v[c, axis] += wc * change
 
 
 @kernel
@@ -135,3 +184,4 @@ def _side(before, a, b, c, i, j):
     gz = _HALF * (before[i, 2] + before[j, 2]) - az
     s = gx * (uy * vz - uz * vy) + gy * (uz * vx - ux * vz) + gz * (ux * vy - uy * vx)
     return _ONE if s >= _ZERO else -_ONE
+

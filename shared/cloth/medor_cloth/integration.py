@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from medor_cloth.cloth import Springs
-from medor_cloth.contact import part_layers, rest_on_table
+from medor_cloth.contact import damp_contacts, part_layers, rest_on_table
 from medor_cloth.grasp import nearest_within_reach
 from medor_cloth.kernel import kernel
 from medor_cloth.proximity import expect, find_neighbours, n_astray
@@ -40,6 +40,7 @@ class Physics(NamedTuple):
     """The constants as the kernels see them, in float32 and per substep where they belong to one."""
 
     substeps: int
+    spring_passes: int
     step: np.float32
     gravity: np.float32
     drag: np.float32
@@ -51,6 +52,7 @@ class Physics(NamedTuple):
     bend_compliance: np.float32
     compression: np.float32
     spring_damping: np.float32
+    contact_damping: np.float32
     settle_speed: np.float32
     cell: np.float32
     least_margin: np.float32
@@ -85,6 +87,7 @@ def simulate(x, v, picker, path, holding, held, calm, topology: Topology, physic
     faces, points, thickness = topology.faces, topology.points, physics.thickness
     expected, margin = np.empty_like(x), np.empty(n, np.float32)
     starts, near = np.empty(0, np.int32), np.empty((4 * len(points), 2), np.int32)
+    corners, weights = np.empty((0, 5), np.int32), np.empty((0, 6), np.float32)
     for frame in range(len(path)):
         held = (held if held >= 0 else nearest_within_reach(x, picker)) if holding[frame] else -1
         if held >= 0:
@@ -98,13 +101,16 @@ def simulate(x, v, picker, path, holding, held, calm, topology: Topology, physic
                     x[held, axis] = start[axis] + share * (path[frame, axis] - picker[axis])
                 x[held, 2] = max(x[held, 2], thickness * np.float32(0.5))
             relax_springs(x, inverse_mass, topology.bend, physics.bend_compliance, _ONE, scratch)
-            relax_springs(x, inverse_mass, topology.stretch, _ZERO, physics.compression, scratch)
+            for _ in range(physics.spring_passes):
+                relax_springs(x, inverse_mass, topology.stretch, _ZERO, physics.compression, scratch)
             if substep == 0 or n_astray(x, expected, margin) > physics.stray * n:
                 expect(x, v, physics.horizon, physics.least_margin, physics.most_margin, expected, margin)
                 starts, near = find_neighbours(
                     expected, margin, faces, topology.across, points, thickness, physics.cell, near
                 )
-            part_layers(
+                if len(corners) < len(near):
+                    corners, weights = np.empty((len(near), 5), np.int32), np.empty((len(near), 6), np.float32)
+            touching = part_layers(
                 x,
                 before,
                 inverse_mass,
@@ -116,12 +122,15 @@ def simulate(x, v, picker, path, holding, held, calm, topology: Topology, physic
                 thickness,
                 physics.layer_friction,
                 physics.push_out,
+                corners,
+                weights,
             )
             rest_on_table(x, before, inverse_mass, thickness * np.float32(0.5), physics.table_friction)
             _update_velocity(x, v, before, physics.step)
             if substep % _DAMPED_EVERY == _DAMPED_EVERY - 1:
                 damp_springs(x, v, inverse_mass, topology.bend.pairs, physics.spring_damping)
                 damp_springs(x, v, inverse_mass, topology.stretch.pairs, physics.spring_damping)
+                damp_contacts(v, inverse_mass, corners, weights, touching, physics.contact_damping)
         if held >= 0:
             inverse_mass[held] = _ONE
         picker[:] = path[frame]

@@ -18,8 +18,10 @@ _FINE, _LOW = np.float32(4), np.float32(0.08)
 """Cells are narrow along x, along which they are read in one go, and high: piles of cloth are low."""
 _LANES = 16
 """Points measured at once; arrays of points are longer by as many."""
-_TILT = np.float32(0.1)
-"""Sine of the angle by which a triangle may turn before its points are listed anew."""
+_RIM = np.float32(0.0015)
+"""How far beside a triangle points are listed [m]."""
+_TILT = np.float32(0.3)
+"""Points beside the rim, or over a triangle that turns, are off by this share of the thickness along each axis."""
 
 
 @kernel
@@ -67,7 +69,7 @@ def find_neighbours(x, margin, faces, across, points, thickness, cell, near):
         cx, cy, cz = (uy * nz - uz * ny) / length_c, (uz * nx - ux * nz) / length_c, (ux * ny - uy * nx) / length_c
         share_b, share_c, height = -length_b / length_a, -length_c / length_a, area / length_a
         own = max(margin[a], margin[b], margin[c])
-        level, rim = thickness + own, thickness * _TILT + own
+        level, rim = thickness + own, _RIM + own
         # A touching point lies over the triangle: it is off by the thickness along the normal, which may tilt.
         rx = thickness * max(abs(nx), _TILT) + own + widest
         ry = thickness * max(abs(ny), _TILT) + own + widest
