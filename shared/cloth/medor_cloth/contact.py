@@ -184,4 +184,3 @@ def _side(before, a, b, c, i, j):
     gz = _HALF * (before[i, 2] + before[j, 2]) - az
     s = gx * (uy * vz - uz * vy) + gy * (uz * vx - ux * vz) + gz * (ux * vy - uy * vx)
     return _ONE if s >= _ZERO else -_ONE
-

@@ -204,4 +204,5 @@ def _physics(config: SolverConfig, edge: float) -> Physics:
         "stray": 0.02,
         "most_margin": 0.002,
     }
-    return Physics(config.substeps, config.spring_passes, **{name: np.float32(value) for name, value in constants.items()})
+    rounded = {name: np.float32(value) for name, value in constants.items()}
+    return Physics(config.substeps, config.spring_passes, **rounded)
