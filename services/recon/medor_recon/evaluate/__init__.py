@@ -1,0 +1,1 @@
+"""How good reconstruction is, on garments and states it has never seen."""
