@@ -161,9 +161,6 @@ def stretches(
     firsts: Sequence[int] | NDArray[np.int64],
     windows: Sequence[NDArray[np.float32]],
     steps: int,
-    firsts: Sequence[int] | NDArray[np.int64],
-    windows: Sequence[NDArray[np.float32]],
-    steps: int,
 ) -> Batch:
     """A batch from histories (6, n, 3), one per recording. Only errors of velocity are to be put right: a history
     that ends beside the recorded positions has targets that lie beside them as far."""
