@@ -29,8 +29,8 @@ class SolverConfig:
     """Speed at which overlapping layers separate at most [m/s]."""
     bend_compliance: float = 1e-3
     """Compliance of bending at edges of 12 mm; scaled by (edge / 12 mm)³ for other meshes."""
-    compression: float = 0.3
-    """Share of the stretching stiffness that acts against compression; cloth buckles."""
+    compression: float = 0.15
+    """Share of a spring's correction that acts against compression, in each pass; cloth buckles."""
     spring_damping: float = 0.4
     """Share of the relative velocity along each spring that is taken away every fourth substep."""
     spring_passes: int = 4
