@@ -63,7 +63,8 @@ class Field(nn.Module):
         self.config, self.categories = config, categories
         kinds = len(categories) if len(categories) > 1 else 0
         self.aggregate = _aggregation(config.features + 9 + kinds, config.aggregation, config.batch_norm)
-        self.unet = UNet3d(config.aggregation[-1], config.volume_features, config.maps, config.levels)
+        unet = UNet3d(config.aggregation[-1], config.volume_features, config.maps, config.levels)
+        self.unet = unet.to(memory_format=torch.channels_last_3d)  # type: ignore[call-overload]
         self.to_winding = Decoder(config.volume_features, config.decoder, 1, config.batch_norm)
         self.to_position = Decoder(config.volume_features + 3, config.decoder, 3, config.batch_norm)
 
@@ -108,8 +109,9 @@ class Field(nn.Module):
         nocs = torch.as_tensor(view.nocs, device=device)
         offset = nocs * (self.config.grid - 1) - nearest_node(nocs, self.config.grid)
         point = torch.as_tensor(view.points, device=device) / LENGTH_M
-        parts = [torch.as_tensor(view.features, device=device), offset, point]
-        parts.append(torch.as_tensor(view.confidence, device=device))
+        parts = [offset, point, torch.as_tensor(view.confidence, device=device)]
+        if self.config.features:
+            parts.append(torch.as_tensor(view.features, device=device))
         if len(self.categories) > 1:
             parts.append(one_hot(view.category, self.categories, len(nocs), device))
         return torch.cat(parts, dim=1)

@@ -2,7 +2,8 @@
 
 Nearest in canonical space: a hidden point follows the cloth it hangs on, not the cloth it lies under. The inverse
 distance fill alone puts a hidden layer beside its visible rim; the network has learnt how cloth goes on from there. It
-reads the neighbours of one point and a pooled summary of all pixels (PointNet, Qi et al. 2017).
+reads the neighbours of one point and a pooled summary of all pixels (PointNet, Qi et al. 2017). All of it happens in
+the frame of the garment: turn the garment on the table, and its completion turns with it.
 """
 
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from torch import Tensor, nn
 from medor_cloth.nocs import NOCS
 from medor_recon.completion.decoder import Decoder
 from medor_recon.completion.field import LENGTH_M
+from medor_recon.completion.heading import headed, heading
 from medor_recon.completion.pixels import Pixels
 
 
@@ -131,8 +133,9 @@ class PooledFill(nn.Module):
 
     def positions(self, pixels: Pixels, canonical: NDArray[np.floating]) -> NDArray[np.float32]:
         """Where canonical points (Q, 3) [m] lie on the table: (Q, 3) world frame [m]."""
-        inputs = fill_inputs(pixels, canonical, self.config, self.categories)
+        R = heading(pixels)
+        inputs = fill_inputs(headed(pixels, R), canonical, self.config, self.categories)
         device = next(self.parameters()).device
         with torch.inference_mode():
             batch = (torch.from_numpy(part[None]).to(device) for part in (inputs.summary, inputs.points, inputs.filled))
-            return self(*batch)[0].cpu().numpy()
+            return self(*batch)[0].cpu().numpy() @ R.T

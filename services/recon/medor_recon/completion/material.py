@@ -19,12 +19,14 @@ class Material:
         held_out: of other garments.
         predictions: a frozen canonicaliser's views.
         looks: observations that a validation takes, spread over the held-out ones.
+        only_predicted: for networks that read a canonicaliser's features: views with true coordinates have none.
     """
 
     learn: list[Observation]
     held_out: list[Observation]
     predictions: Predictions | None = None
     looks: int = 100
+    only_predicted: bool = False
 
     def draw(self, predicted: float, rng: np.random.Generator) -> tuple[Observation, Prediction | None]:
         """One observation, as a canonicaliser sees it in a share of the cases."""
@@ -44,7 +46,7 @@ class Material:
         The one named `score` becomes the score, predicted if there is a canonicaliser: that is what will be met.
         """
         looked_at = self.looked_at
-        metrics = measure([example(one) for one in looked_at])
+        metrics = {} if self.only_predicted else measure([example(one) for one in looked_at])
         if self.predictions:
             found = measure([example(one, self.predictions(one)) for one in looked_at])
             metrics |= {f"predicted_{name}": value for name, value in found.items()}

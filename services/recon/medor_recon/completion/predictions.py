@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +26,11 @@ class Predictions:
         canonicalize: the canonicaliser.
         folder: one canonicaliser's predictions, a file a trajectory; made if need be.
         spacing: of the pixels kept, on the table [m]; must stay the same for a folder.
+        features: keep the network's features, too (a thousand bytes a pixel); must stay the same for a folder.
     """
 
-    def __init__(self, canonicalize: Canonicalize, folder: Path, spacing: float) -> None:
-        self.canonicalize, self.folder, self.spacing = canonicalize, folder, spacing
+    def __init__(self, canonicalize: Canonicalize, folder: Path, spacing: float, features: bool = False) -> None:
+        self.canonicalize, self.folder, self.spacing, self.features = canonicalize, folder, spacing, features
 
     def __call__(self, observation: Observation) -> Prediction:
         """The view of the pixels on the cloth, and how the garment is turned in it."""
@@ -41,15 +43,23 @@ class Predictions:
             turn = Turn(file[f"{observation.step}.turn"])
         return Prediction(Pixels(record.category, *parts), turn)
 
+    def seen(self, observation: Observation) -> Canonicalized:
+        """The same view unthinned, computed anew."""
+        trajectory, step = observation.trajectory, observation.step
+        return self._canonicalized(trajectory.garment.category, trajectory["depth"][step], trajectory["mask"][step])
+
+    def _canonicalized(self, category: str, depth: NDArray[np.float32], mask: NDArray[np.bool_]) -> Canonicalized:
+        return self.canonicalize(category, np.where(mask, depth, 0), CAMERA)
+
     def _compute(self, observation: Observation, path: Path) -> None:
         """All views of a trajectory."""
         trajectory = observation.trajectory
         arrays = [trajectory[name] for name in ("depth", "mask", "nocs")]
         content: dict[str, NDArray] = {}
         for step, (depth, mask, nocs) in enumerate(zip(*arrays, strict=True)):
-            seen = self.canonicalize(trajectory.garment.category, np.where(mask, depth, 0), CAMERA)
+            seen = self._canonicalized(trajectory.garment.category, depth, mask)
             turn = winning(seen.category, seen.nocs, _true(nocs, seen))
-            pixels = thinned(seen, self.spacing)
+            pixels = thinned(seen if self.features else replace(seen, features=seen.features[:, :0]), self.spacing)
             content |= {f"{step}.{part}": _compact(part, getattr(pixels, part)) for part in PARTS}
             content[f"{step}.turn"] = turn.matrix
         path.parent.mkdir(parents=True, exist_ok=True)

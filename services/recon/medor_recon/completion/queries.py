@@ -51,8 +51,10 @@ def winding_at(winding: NDArray[np.floating], points: NDArray[np.floating]) -> N
     return np.asarray(map_coordinates(winding.astype(np.float32), nodes, order=1, mode="nearest"), np.float32)
 
 
-def on_surface(item: Example, rng: np.random.Generator, number: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Points spread evenly over the canonical surface, every other one pushed off it, and their positions."""
+def on_surface(
+    item: Example, rng: np.random.Generator, number: int, push: float = PUSH
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Points spread evenly over the canonical surface, every other one off it by `push`, and their positions."""
     corners = item.nocs[item.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(normal, axis=1)
@@ -60,7 +62,7 @@ def on_surface(item: Example, rng: np.random.Generator, number: int) -> tuple[ND
     u, v = rng.random((2, number, 1))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     weights = np.stack([1 - u - v, u, v], axis=1)
-    push = rng.normal(0, PUSH, (number, 1)) * (np.arange(number) % 2)[:, None]
-    nocs = (weights * corners[face]).sum(axis=1) + push * normal[face] / area[face, None]
+    off = rng.normal(0, push, (number, 1)) * (np.arange(number) % 2)[:, None]
+    nocs = (weights * corners[face]).sum(axis=1) + off * normal[face] / area[face, None]
     positions = (weights * item.positions[item.faces[face]]).sum(axis=1)
     return nocs.astype(np.float32), positions.astype(np.float32)
