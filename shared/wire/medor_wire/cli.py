@@ -1,4 +1,4 @@
-"""The command `medor`: run a cell, watch it unfold a garment, find out what is wrong."""
+"""The command `medor`: run a cell, watch it unfold a garment, look at cloth, find out what is wrong."""
 
 import json
 import subprocess
@@ -101,10 +101,17 @@ def doctor(router: str = f"tcp/127.0.0.1:{ROUTER_PORT}", port: int = 8080, as_js
     return int(any(finding.state == "wrong" for finding in findings))
 
 
+def view() -> int:
+    """Show cloth as PNG, GIF or an interactive page: a mesh, a state, a rollout, a data set (medor view --help)."""
+    return subprocess.call([sys.executable, "-m", "medor_cloth.view", *sys.argv[2:]])
+
+
 def main() -> None:
     heed_signals()
+    if sys.argv[1:2] == ["view"]:  # its words are the viewer's own
+        sys.exit(view())
     try:
-        commands = {"up": up, "demo": demo, "doctor": doctor}
+        commands = {"up": up, "demo": demo, "view": view, "doctor": doctor}
         sys.exit(tyro.extras.subcommand_cli_from_dict(commands, prog="medor", description=__doc__))
     except (CellError, ComposeError) as error:
         sys.exit(f"medor: {error}")

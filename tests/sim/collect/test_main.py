@@ -3,7 +3,7 @@ import sys
 import numpy as np
 import pytest
 import trimesh
-from PIL import Image, ImageSequence
+from PIL import Image
 
 from medor_sim.collect.__main__ import main, parse_shard
 
@@ -40,17 +40,6 @@ def test_export_ply_holds_the_posed_mesh(monkeypatch, tmp_path, recon_data):
     assert len(files) == 5
     np.testing.assert_allclose(mesh.vertices, recon_data[0]["positions"][2], atol=1e-6)
     np.testing.assert_array_equal(mesh.faces, recon_data[0].garment["faces"])
-
-
-def test_show_writes_moving_pictures_and_strips(monkeypatch, tmp_path, dynamics_data):
-    run(monkeypatch, "show", dynamics_data.folder, "--out", tmp_path / "a.gif")
-    with Image.open(tmp_path / "a.gif") as gif:
-        assert len(list(ImageSequence.Iterator(gif))) == 17
-    run(monkeypatch, "show", dynamics_data.folder, "--out", tmp_path / "a.png")
-    with Image.open(tmp_path / "a.png") as strip:
-        assert strip.size == (17 * 360, 360)
-    with pytest.raises(SystemExit, match="gif"):
-        run(monkeypatch, "show", dynamics_data.folder, "--out", tmp_path / "a.txt")
 
 
 @pytest.mark.parametrize("text", ["1", "3/3", "a/b", "-1/2"])

@@ -14,7 +14,6 @@ from rich.console import Console
 from medor_cloth.dataset import Dataset
 from medor_cloth.errors import ClothError, DatasetError
 from medor_sim.collect import export as exporting
-from medor_sim.collect import show as showing
 from medor_sim.collect.contact_sheet import write_contact_sheet
 from medor_sim.collect.plan import Plan
 from medor_sim.collect.progress import CollectionProgress
@@ -108,17 +107,6 @@ def export(
     CONSOLE.print(f"{exporting.export(folder, out, form, first, count)} trajectories in {out}")
 
 
-def show(folder: tyro.conf.Positional[Path], out: Path, index: int = 0) -> None:
-    """Write one trajectory as a moving picture (.gif) or a strip of pictures (.png).
-
-    Args:
-        folder: the data set, or one shard.
-        out: file to write.
-        index: of the trajectory.
-    """
-    showing.show(folder, index, out)
-
-
 def preview(folder: tyro.conf.Positional[Path], out: Path, trajectories: int = 4) -> None:
     """Write a contact sheet of some trajectories.
 
@@ -154,7 +142,7 @@ def parse_shard(text: str) -> tuple[int, int]:
 
 def main() -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends the workers as Ctrl-C does
-    commands = {"recon": recon, "dynamics": dynamics, "preview": preview, "show": show, "export": export}
+    commands = {"recon": recon, "dynamics": dynamics, "preview": preview, "export": export}
     try:
         tyro.extras.subcommand_cli_from_dict(commands, prog="medor_sim.collect", description=__doc__)
     except (ClothError, ValueError) as error:

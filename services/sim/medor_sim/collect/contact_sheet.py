@@ -5,16 +5,15 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
 
-from medor_cloth.camera import Camera, overhead
+from medor_cloth.camera import overhead
 from medor_cloth.dataset import Dataset, Trajectory
 from medor_cloth.picture import depth_picture, png_bytes, shade
+from medor_cloth.portrait import with_arrow
 from medor_cloth.raster import rasterize
 
 CAMERA = overhead(200)
 GAP_PX = 4
-ARROW_RGB, RING_RGB = (255, 80, 60), (255, 255, 255)
 
 
 def write_contact_sheet(folder: Path, path: Path, trajectories: int = 4) -> None:
@@ -46,19 +45,6 @@ def dynamics_rows(trajectory: Trajectory) -> list[list[NDArray[np.uint8]]]:
     chosen = positions[np.linspace(0, len(positions) - 1, 8).round().astype(int)]
     lit = [shade(rasterize(one, faces, CAMERA), CAMERA) for one in chosen]
     return [[with_arrow(lit[0], trajectory["move"], CAMERA), *lit[1:]]]
-
-
-def with_arrow(picture: NDArray[np.uint8], move: NDArray[np.float32], camera: Camera) -> NDArray[np.uint8]:
-    """A picture with an arrow from pick to place (2, 3); as it is where there is no move (NaN)."""
-    if not np.isfinite(move).all():
-        return picture
-    (x0, y0), (x1, y1) = camera.project(move)[0]
-    image = Image.fromarray(picture)
-    draw = ImageDraw.Draw(image)
-    draw.line((x0, y0, x1, y1), fill=ARROW_RGB, width=2)
-    draw.ellipse((x0 - 4, y0 - 4, x0 + 4, y0 + 4), outline=RING_RGB, width=2)
-    draw.ellipse((x1 - 3, y1 - 3, x1 + 3, y1 + 3), fill=ARROW_RGB)
-    return np.asarray(image)
 
 
 def tiled(rows: Sequence[Sequence[NDArray[np.uint8]]]) -> NDArray[np.uint8]:
