@@ -45,7 +45,13 @@ class Topic(Generic[Content]):
     """Overtakes everything else on the wire."""
 
 
-RECONSTRUCT = Endpoint("recon/reconstruct", m.ReconstructRequest, m.Reconstruction, timeout_s=30)
+RECONSTRUCT = Endpoint(
+    "recon/reconstruct",
+    m.ReconstructRequest,
+    m.Reconstruction,
+    timeout_s=30,
+    progress=m.ReconstructProgress,
+)
 
 ROLLOUT = Endpoint(
     "dynamics/rollout",

@@ -53,6 +53,7 @@ def mesh(side: int = 5) -> m.ClothMesh:
         visible=np.ones(len(vertices), bool),
         canonical=canonical,
         panel_uv=vertices[faces][:, :, :2],
+        confidence=np.full(len(vertices), 0.5, np.float32),
     )
 
 
@@ -121,6 +122,7 @@ def _exchanges() -> dict[Endpoint, Exchange]:
         e.RECONSTRUCT: Exchange(
             m.ReconstructRequest(view=view(), category="tshirt"),
             m.Reconstruction(mesh=cloth, timings_ms={"segment": 1.5, "mesh": 40.0}),
+            m.ReconstructProgress(stage="mesh"),
         ),
         e.ROLLOUT: Exchange(
             m.RolloutRequest(mesh=cloth, picks=TOP, places=TOP, reward=reward),

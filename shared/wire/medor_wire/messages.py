@@ -115,7 +115,9 @@ class ClothMesh(Message):
     canonical: Annotated[F4, Shape("V 3", "f4")] | None = None
     """The same vertices in canonical space [m]."""
     panel_uv: Annotated[F4, Shape("F 3 2", "f4")] | None = None
-    """Flat panel coordinates per face corner [m]: the rest shape. Absent: at rest as it lies."""
+    """Flat panel coordinates per face corner [m]: the rest shape. Absent: at rest in canonical space, or as it lies."""
+    confidence: Annotated[F4, Shape("V", "f4")] | None = None
+    """How sure reconstruction is of each vertex, from 0 to 1; where it is the truth, or all seen, there is none."""
 
     @model_validator(mode="after")
     def _faces_in_range(self) -> Self:
@@ -137,6 +139,11 @@ class Reconstruction(Message):
     mesh: ClothMesh
     timings_ms: dict[str, float]
     """By stage."""
+
+
+class ReconstructProgress(Message):
+    stage: str
+    """The stage that has begun, named as in `Reconstruction.timings_ms`."""
 
 
 class FlattenRequest(Message):
