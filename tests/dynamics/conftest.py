@@ -1,12 +1,21 @@
-"""Small pieces of cloth as messages."""
+"""Small pieces of cloth: as messages, as recordings of what the solver does to them, as graphs."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from medor_cloth.camera import overhead
+from medor_cloth.cloth import Cloth
+from medor_cloth.picker import pick_place
 from medor_cloth.raster import visible_vertices
+from medor_cloth.solver import Solver
+from medor_dynamics.model import Dynamics
+from medor_dynamics.node_mesh import NodeMesh
+from medor_dynamics.preset import CPU, PULL_STEPS, STEPS, Preset
+from medor_dynamics.samples import Recording
 from medor_wire.messages import ClothMesh, Reward, RolloutRequest
 
 
@@ -43,3 +52,44 @@ def request_for() -> Callable[..., RolloutRequest]:
         )
 
     return make
+
+
+@pytest.fixture(scope="session")
+def folded() -> Recording:
+    """A corner of a sheet pulled over the rest of it by the cloth solver, seen at every model step."""
+    return recording_of(sheet_mesh(side=0.15), np.array([0.12, 0.1, 0.05], np.float32))
+
+
+def recording_of(mesh: ClothMesh, pull: np.ndarray) -> Recording:
+    solver = Solver(Cloth.from_mesh(mesh.vertices, mesh.faces))
+    pick = mesh.vertices[0] + np.array([0, 0, 0.01], np.float32)
+    frames = pick_place(solver, solver.rest(mesh.vertices), pick, pick + pull, record_every=5).frames
+    frames = np.concatenate([mesh.vertices[None], frames, np.repeat(frames[-1:], STEPS, axis=0)])[: STEPS + 1]
+    nodes = NodeMesh.of(mesh)
+    return Recording(
+        category=mesh.category,
+        positions=frames[:, nodes.ids],
+        edges=nodes.edges,
+        rest=nodes.rest_lengths(mesh.vertices[nodes.ids], CPU),
+        node=nodes.node_of(0),
+        step=pull / np.float32(PULL_STEPS),
+    )
+
+
+SMALL = replace(CPU, width=16, blocks=2, normalize=False)
+"""Everything the preset does, at a size for tests."""
+
+
+@pytest.fixture
+def model() -> Callable[..., Dynamics]:
+    def make(preset: Preset = SMALL, *, seed: int = 0) -> Dynamics:
+        torch.manual_seed(seed)
+        return Dynamics(preset).eval()
+
+    return make
+
+
+@pytest.fixture
+def crumpled() -> np.ndarray:
+    """(n, 3) nodes in several layers [m]."""
+    return np.random.default_rng(5).uniform((-0.08, -0.08, 0), (0.08, 0.08, 0.04), (60, 3)).astype(np.float32)

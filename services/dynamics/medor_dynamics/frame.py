@@ -11,7 +11,7 @@ def headings(pulls: NDArray, preset: Preset) -> NDArray[np.float64]:
     """(K,) angle of the model's x axis in the world, about z [rad], for pulls (K, 3). A vertical pull has none: 0."""
     if preset.frame == "world":
         return np.zeros(len(pulls))
-    return np.arctan2(pulls[:, 1], pulls[:, 0])
+    return np.arctan2(pulls[:, 1], pulls[:, 0], dtype=np.float64)
 
 
 def turned(points: NDArray, angles: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -122,7 +122,7 @@ def weight_of(layer: nn.Module, dtype: torch.dtype) -> Tensor:
 
 def bias_of(layer: nn.Module) -> NDArray[np.float32]:
     assert isinstance(layer, nn.Linear)
-    return layer.bias.detach().float().numpy()
+    return layer.bias.detach().float().clone().numpy()
 
 
 def raw(values: Tensor) -> NDArray:

@@ -1,0 +1,96 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from medor_dynamics.evaluate import motionless_errors, rollout_errors
+from medor_dynamics.foresight import Foresight
+from medor_dynamics.model import Dynamics
+from medor_dynamics.preset import CPU
+from medor_dynamics.rollout import Pulls, roll_out
+from medor_dynamics.samples import Recording, Sampler
+from medor_dynamics.shipped import build, load
+from medor_learn.loop import Schedule, train
+
+TINY = replace(CPU, width=24, blocks=2)
+CARD = {"preset": {**vars(TINY)}}
+
+
+def task_of(folded: Recording, **options) -> Foresight:
+    torch.manual_seed(0)
+    return Foresight(Dynamics(TINY), Sampler([folded], **{"size": 4} | options), [folded])
+
+
+def test_one_recording_is_learnt_by_heart(folded, tmp_path):
+    """A model that has seen one pull often enough foresees it far better than that nothing moves."""
+    task = task_of(folded, size=8, noise=0.02)
+    before = task.validate()
+    train(task, tmp_path, Schedule(steps=250, lr=5e-3, warm_up=20, validate_every=125), card=CARD)
+    after = task.validate()
+    assert after["score"] < 0.35 * after["no_motion"]
+    assert after["score"] < 0.5 * before["score"]
+    assert load(tmp_path / "best").preset == TINY
+
+
+def test_the_unrolled_loss_of_one_step_is_the_squared_error_of_the_acceleration(folded):
+    task = task_of(folded)
+    batch = Sampler([folded], size=4).draw(5)
+    model = task.module
+    after = model(batch.graphs, batch.motion, batch.grips[0])
+    accelerations = [
+        (to - batch.motion.positions) / 0.05 - batch.motion.velocities[:, 0]
+        for to in (after.positions, batch.targets[0])
+    ]
+    free = torch.ones(len(after.positions), dtype=torch.bool)
+    free[batch.grips[0].nodes] = False
+    error = ((accelerations[0] - accelerations[1])[free] / 0.05 / model.normalizer.acceleration_scale).square()
+    share = free.float().mean()
+    assert float(task.loss(5).detach()) == pytest.approx(float((error.mean() * share).detach()), rel=0.05)
+
+
+def test_longer_stretches_teach_the_same_network(folded):
+    loss = task_of(folded, steps=3).loss(0)
+    loss.backward()
+    assert torch.isfinite(loss)
+
+
+def test_training_goes_on_where_it_stopped(folded, tmp_path):
+    schedule = Schedule(steps=6, validate_every=3, warm_up=2)
+    train(task_of(folded), tmp_path / "whole", schedule, card=CARD)
+    train(task_of(folded), tmp_path / "halves", replace(schedule, steps=3), card=CARD)
+    resumed = task_of(folded)
+    train(resumed, tmp_path / "halves", schedule, card=CARD)
+    lines = [(tmp_path / name / "log.jsonl").read_text().splitlines()[-1] for name in ("whole", "halves")]
+    assert [line.split('"loss"')[0].split('"hours"')[0] for line in lines] == ['{"step": 6, '] * 2
+
+
+def test_the_same_seed_gives_the_same_model(folded, tmp_path):
+    tasks = [task_of(folded) for _ in range(2)]
+    for task, name in zip(tasks, "ab", strict=True):
+        train(task, tmp_path / name, Schedule(steps=3, warm_up=1), card=CARD)
+    one, two = (list(task.module.parameters()) for task in tasks)
+    for ours, theirs in zip(one, two, strict=True):
+        torch.testing.assert_close(ours, theirs, rtol=0, atol=0)
+
+
+def test_what_is_validated_is_what_a_plan_gets(folded):
+    """The error of recordings, rolled out many at a time, is that of the rollout of their mesh and pull."""
+    model = task_of(folded).module
+    assert isinstance(model, Dynamics)
+    from medor_dynamics.graphs import Graphs
+
+    start = folded.positions[0]
+    graph = Graphs.of([len(start)], [folded.edges], [folded.rest])
+    after = roll_out(model.predictor(), graph, start, Pulls(np.array([folded.node]), 10 * folded.step[None]))[0]
+    error = np.linalg.norm(after - folded.positions[-1], axis=1).mean()
+    assert rollout_errors(model, [folded] * 3)[:, -1] == pytest.approx([error] * 3, rel=1e-4)
+
+
+def test_the_error_of_standing_still_is_the_distance_travelled(folded):
+    travelled = np.linalg.norm(folded.positions[5] - folded.positions[0], axis=1).mean()
+    assert motionless_errors([folded])[0, 4] == pytest.approx(travelled)
+
+
+def test_a_config_builds_its_model():
+    assert build(CARD).preset == TINY
