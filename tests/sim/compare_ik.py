@@ -5,6 +5,7 @@ squares), by PyBullet and by the arm's own formula, each from the same seed; jud
 """
 
 import importlib
+import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -85,8 +86,10 @@ def main() -> None:
             ms = 1e3 * (time.process_time() - begun) / POSES
             metres, radians = np.transpose([_off(world, q, *pose) for q, *pose in zip(joints, *poses, strict=True)])
             reached = np.mean((metres < REACHED_M) & (radians < REACHED_RAD))
-            print(f"{name:30} {ms:.4f} ms, median {1e3 * np.median(metres):.4f} mm, worst {1e3 * metres.max():.4f} mm")
-            print(f"{'':30} reached {reached:.1%} (within 1 mm and 0.01 rad, joint limits kept)")
+            sys.stdout.write(
+                f"{name:30} {ms:.4f} ms, median {1e3 * np.median(metres):.4f} mm, worst {1e3 * metres.max():.4f} mm; "
+                f"{reached:.1%} reached within 1 mm and 0.01 rad, joint limits kept\n"
+            )
 
 
 def _off(world: World, joints: np.ndarray, point: np.ndarray, rotation: np.ndarray) -> tuple[float, float]:
