@@ -2,11 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 from medor_wire.messages import Category, EpisodeRequest, Executor, ResetRequest, StartState, Task
 
 HELD_OUT_SEED = 800_000
 """First garment seed that nothing is ever trained on."""
+
+Engine = Literal["xpbd", "bullet"]
+"""What moves the cloth in the simulated cell (`MEDOR_SIM__ENGINE`)."""
 
 
 @dataclass(frozen=True)
@@ -21,17 +25,24 @@ class Trial:
     picks: int
     candidates: int
     executor: Executor = "picker"
+    engine: Engine = "xpbd"
 
     @property
     def key(self) -> str:
         """Names the trial in the results file; the same key is never run twice into one file."""
         key = f"{self.method}/{self.category}/{self.task}/{self.start}{self.state}/p{self.picks}/k{self.candidates}"
-        return key if self.executor == "picker" else f"{key}/{self.executor}"
+        return "/".join([key, *self.unusual])
 
     @property
     def label(self) -> str:
-        """The method, and who picked when that is not the flying gripper."""
-        return self.method if self.executor == "picker" else f"{self.method} ({self.executor})"
+        """The method, and what is not as usual about the cell."""
+        return f"{self.method} ({', '.join(self.unusual)})" if self.unusual else self.method
+
+    @property
+    def unusual(self) -> list[str]:
+        """Who picks when that is not the flying gripper, what moves the cloth when that is not our solver."""
+        usual = {"picker", "xpbd"}
+        return [choice for choice in (self.executor, self.engine) if choice not in usual]
 
     def request(self) -> EpisodeRequest:
         """Garment and crumple depend on the state alone, so that all methods and tasks meet the same states."""
@@ -61,6 +72,7 @@ def trials(
     picks: int,
     candidates: int,
     executors: tuple[Executor, ...] = ("picker",),
+    engine: Engine = "xpbd",
 ) -> Iterator[Trial]:
     """State by state, so that an unfinished run has every method on the same first states."""
     for state in range(states):
@@ -68,4 +80,4 @@ def trials(
             for task in tasks:
                 for method in methods:
                     for executor in executors:
-                        yield Trial(method, category, task, state, start, picks, candidates, executor)
+                        yield Trial(method, category, task, state, start, picks, candidates, executor, engine)

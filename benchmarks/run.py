@@ -15,7 +15,7 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
-from benchmarks.protocol import Trial, trials
+from benchmarks.protocol import Engine, Trial, trials
 from benchmarks.results import Line, Results
 from benchmarks.table import markdown
 from medor_wire import endpoints
@@ -42,19 +42,21 @@ class Options:
     candidates: int = 100
     executor: tuple[Executor, ...] = ("picker",)
     """Who picks: the paper's flying gripper, the Panda arm, or both on the same states."""
+    engine: Engine = "xpbd"
+    """What moves the cloth in the cell that is started: our solver, or PyBullet's soft body (slow)."""
     out: Path = Path("runs/bench")
     router: str = ""
     """Zenoh endpoint of a running cell; empty starts one."""
 
 
 @contextmanager
-def cell_bus(router: str, logs: Path) -> Iterator[Bus]:
+def cell_bus(router: str, engine: Engine, logs: Path) -> Iterator[Bus]:
     """A bus member in a simulated cell, started for the purpose (with its `logs`) when no router is given."""
     if router:
         with join("benchmark", BusConfig(router=router)) as bus:
             yield bus
         return
-    with Launcher("sim", echo=False, logs=logs) as cell:
+    with Launcher("sim", environment={"MEDOR_SIM__ENGINE": engine}, echo=False, logs=logs) as cell:
         cell.wait_ready()
         yield cell.bus
 
@@ -111,6 +113,7 @@ def main(options: Options) -> int:
             options.picks,
             options.candidates,
             options.executor,
+            options.engine,
         )
     )
     missing = [trial for trial in every if trial.key not in results.finished()]
@@ -128,7 +131,7 @@ def main(options: Options) -> int:
 def run_missing(missing: list[Trial], results: Results, options: Options, console: Console) -> int:
     """Run trials one after the other; how many failed."""
     failed, began = 0, time.monotonic()
-    with cell_bus(options.router, (options.out / "logs").absolute()) as bus:
+    with cell_bus(options.router, options.engine, (options.out / "logs").absolute()) as bus:
         for done, trial in enumerate(missing):
             try:
                 results.append(run_trial(bus, trial, console))

@@ -134,7 +134,7 @@ def start_state(piece: Piece, state: StartState, seed: int) -> ClothState:
     """The garment as an episode finds it: dropped, flat, or flat and then disturbed by random picks."""
     rng = np.random.default_rng([STATES.index(state), seed])
     if state == "drop":
-        return dropped(piece.engine, piece.flat, rng)
+        return dropped(piece.engine, piece.flat, rng, piece.max_start_coverage)
     if state == "picks":
         return picked(piece.engine, piece.flat, rng)
     return piece.flat

@@ -5,8 +5,10 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from medor_cloth.camera import overhead
+from medor_sim.grasp_failures import GraspFailures
 from medor_sim.scene import Scene
 from medor_sim.simulator import Simulator
 from medor_sim.wardrobe import Wardrobe
@@ -20,10 +22,16 @@ from medor_wire.motion import Motion
 
 
 class Config(Settings, section="sim"):
-    engine: Literal["xpbd"] = "xpbd"
-    """Cloth engine."""
+    engine: Literal["xpbd", "bullet"] = "xpbd"
+    """What moves the cloth: our solver, or PyBullet's soft body (slow; see the README)."""
     ledger: Path = Path("runs/sim/ledger.sqlite")
     """Where actions are written down before they are carried out."""
+    miss: float = Field(default=0.0, ge=0, le=1)
+    """Probability that a grasp catches nothing."""
+    two_layers: float = Field(default=0.0, ge=0, le=1)
+    """Probability that a grasp catches the next layer too, where there is one."""
+    failure_seed: int = Field(default=0, ge=0)
+    """Of the chance with which grasps fail."""
     garments: int = 8
     """Garments kept with their flat state and goals; as many uploaded ones."""
 
@@ -47,9 +55,10 @@ def warm_up() -> None:
 def main(config: Config) -> None:
     ledger = Ledger(config.ledger)
     motion = Motion(ledger, Lessor(ledger))
+    failures = GraspFailures(config.miss, config.two_layers, config.failure_seed)
     with join("sim", config.bus) as bus:
         bus.ready(False, "warming up")
-        with closing(Simulator(motion, Wardrobe(config.garments), bus.publish)) as simulator:
+        with closing(Simulator(motion, Wardrobe(config.garments, config.engine), bus.publish, failures)) as simulator:
             serve(bus, simulator, motion)
             warm_up()
             bus.ready()

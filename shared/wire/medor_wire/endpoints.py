@@ -63,7 +63,7 @@ ROLLOUT = Endpoint(
 FLATTEN = Endpoint("dynamics/flatten", m.FlattenRequest, m.GoalSet, timeout_s=120)
 
 PLAN = Endpoint("planner/plan", m.PlanRequest, m.Plan, timeout_s=1200, progress=m.PlanProgress)
-EXECUTE = Endpoint("planner/execute", m.ExecuteRequest, m.ActOutcome, timeout_s=120, read_only=False)
+EXECUTE = Endpoint("planner/execute", m.ExecuteRequest, m.ActOutcome, timeout_s=300, read_only=False)
 EPISODE = Endpoint(
     "planner/episode",
     m.EpisodeRequest,
@@ -77,10 +77,10 @@ CAPTURE = Endpoint("robot/capture", m.Empty, m.DepthView, timeout_s=10)
 STATUS = Endpoint("robot/status", m.Empty, m.CellStatus, timeout_s=5)
 REACH = Endpoint("robot/reach", m.ReachRequest, m.Reach, timeout_s=30)
 LEASE = Endpoint("robot/lease", m.LeaseRequest, m.Lease, timeout_s=5, read_only=False, routine=True)
-ACT = Endpoint("robot/act", m.ActRequest, m.ActOutcome, timeout_s=120, read_only=False)
+ACT = Endpoint("robot/act", m.ActRequest, m.ActOutcome, timeout_s=300, read_only=False)
 CLEAR_STOP = Endpoint("robot/clear_stop", m.ClearStop, m.CellStatus, timeout_s=5, read_only=False)
 
-RESET = Endpoint("sim/reset", m.ResetRequest, m.Score, timeout_s=120, read_only=False)
+RESET = Endpoint("sim/reset", m.ResetRequest, m.Score, timeout_s=600, read_only=False)
 SCORE = Endpoint("sim/score", m.Empty, m.Score, timeout_s=30)
 TRUTH = Endpoint("sim/truth", m.Empty, m.Truth, timeout_s=30)
 UPLOAD_GARMENT = Endpoint("sim/upload_garment", m.UploadGarment, m.GarmentId, timeout_s=60, read_only=False)
