@@ -55,14 +55,20 @@ def test_longer_stretches_teach_the_same_network(folded):
     assert torch.isfinite(loss)
 
 
-def test_training_goes_on_where_it_stopped(folded, tmp_path):
-    schedule = Schedule(steps=6, validate_every=3, warm_up=2)
-    train(task_of(folded), tmp_path / "whole", schedule, card=CARD)
-    train(task_of(folded), tmp_path / "halves", replace(schedule, steps=3), card=CARD)
-    resumed = task_of(folded)
-    train(resumed, tmp_path / "halves", schedule, card=CARD)
-    lines = [(tmp_path / name / "log.jsonl").read_text().splitlines()[-1] for name in ("whole", "halves")]
-    assert [line.split('"loss"')[0].split('"hours"')[0] for line in lines] == ['{"step": 6, '] * 2
+def test_training_goes_on_where_it_was_cut_off(folded, tmp_path):
+    schedule = Schedule(steps=5, warm_up=2, checkpoint_s=0)
+    whole, cut, resumed = (task_of(folded, noise=0.1, mirror=True) for _ in range(3))
+    train(whole, tmp_path / "whole", schedule, card=CARD)
+
+    def power_cut(step: int, loss: float) -> None:
+        if step == 3:
+            raise ConnectionAbortedError
+
+    with pytest.raises(ConnectionAbortedError):
+        train(cut, tmp_path / "cut", schedule, card=CARD, on_step=power_cut)
+    train(resumed, tmp_path / "cut", schedule, card=CARD)
+    for ours, theirs in zip(whole.module.parameters(), resumed.module.parameters(), strict=True):
+        torch.testing.assert_close(ours, theirs, rtol=0, atol=0)
 
 
 def test_the_same_seed_gives_the_same_model(folded, tmp_path):

@@ -4,6 +4,7 @@ import time
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from medor_cloth.cloth import Cloth
 from medor_cloth.errors import ClothError
@@ -61,14 +62,21 @@ class Physics:
 
 
 def by_rest_shape(mesh: ClothMesh) -> ByContent[ClothMesh]:
-    """A mesh compared by what its solver depends on: with panels, not by where its vertices are."""
-    return ByContent.of(mesh, mesh.faces, mesh.vertices if mesh.panel_uv is None else mesh.panel_uv)
+    """A mesh compared by what its solver depends on: where its rest shape is known, not by how it lies."""
+    return ByContent.of(mesh, mesh.faces, mesh.panel_uv if mesh.panel_uv is not None else rest_shape(mesh))
 
 
 def solver_of(mesh: ByContent[ClothMesh]) -> Solver:
-    """The solver of a mesh: at rest in its panels, else as it lies (MEDOR, section IV-B)."""
-    vertices, faces, panel_uv = mesh.value.vertices, mesh.value.faces, mesh.value.panel_uv
+    """The solver of a mesh, at rest in its panels or else in its rest shape."""
     try:
-        return Solver(Cloth.from_mesh(vertices, faces, panel_uv))
+        return Solver(Cloth.from_mesh(rest_shape(mesh.value), mesh.value.faces, mesh.value.panel_uv))
     except ClothError as error:
         raise BadRequest(f"the mesh cannot be cloth: {error}") from error
+
+
+def rest_shape(mesh: ClothMesh) -> NDArray[np.float32]:
+    """(V, 3) where a mesh without panels is at rest: in canonical space, else as it lies (MEDOR, section IV-B).
+
+    A reconstructed mesh lies stretched in places. As it lies it would keep that for ever.
+    """
+    return mesh.vertices if mesh.canonical is None else mesh.canonical

@@ -20,6 +20,10 @@ class Roller:
     def __init__(self, backends: Mapping[str, Backend]) -> None:
         self._backends = backends
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self._backends)
+
     def roll_out(self, request: RolloutRequest, call: Call) -> Rollouts:
         """Raises `BadRequest` for a backend that is not here, else what the backend raises."""
         if request.backend not in self._backends:

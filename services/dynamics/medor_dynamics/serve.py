@@ -43,7 +43,7 @@ def main(config: Config) -> None:
         bus.ready(False, "compiling")
         bus.serve(endpoints.ROLLOUT, roller.roll_out)
         bus.serve(endpoints.FLATTEN, Flattener().flatten)
-        warm_up()
+        warm_up(roller)
         bus.ready()
         bus.run()
 
