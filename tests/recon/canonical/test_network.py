@@ -104,3 +104,9 @@ def test_every_parameter_is_learnt():
     (said.logits.square().mean() + said.side.square().mean()).backward()
     still = [name for name, p in module.named_parameters() if p.grad is None or not p.grad.any()]
     assert still == []
+
+
+def test_a_network_that_was_not_taught_sides_leaves_coordinates_as_they_are():
+    module = ImageNetwork(replace(TINY, side=0.0))
+    side = module(*seen(TINY), torch.zeros(3, dtype=torch.long)).side
+    assert side.softmax(-1)[:, 0].min() > 0.999

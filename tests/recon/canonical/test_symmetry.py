@@ -80,3 +80,9 @@ def test_half_a_turn_twice_is_none():
     twice = turned_points(turned_points(nocs, "tshirt", 1), "tshirt", 1)
     np.testing.assert_allclose(twice, nocs, atol=1e-6)
     assert np.abs(turned_points(nocs, "tshirt", 1)[:, 2] - nocs[:, 2]).max() < 1e-6
+
+
+def test_labels_are_not_rounded_where_the_network_is():
+    nocs = points()
+    with torch.autocast("cpu", torch.bfloat16):
+        torch.testing.assert_close(turned(nocs, rotations("skirt"))[0], nocs, atol=1e-6, rtol=0)

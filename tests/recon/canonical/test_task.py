@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from medor_recon.canonical.batches import Batch
 from medor_recon.canonical.head import to_bins
 from medor_recon.canonical.measures import Judgement, summary
 from medor_recon.canonical.network import Prediction, build
@@ -55,8 +56,6 @@ def test_the_loss_of_a_batch_is_the_mean_over_its_views_whatever_their_category(
             return Prediction(
                 50 * torch.nn.functional.one_hot(to_bins(nocs, 64), 64).float(), nocs, torch.zeros(len(nocs), 2)
             )
-
-    from medor_recon.canonical.batches import Batch
 
     nocs = 0.5 + 0.4 * (torch.rand(4, 30, 3) - 0.5)
     said = nocs.clone()

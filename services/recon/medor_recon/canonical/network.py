@@ -15,6 +15,8 @@ from medor_recon.canonical.symmetry import HALF_TURNS
 
 SIDE_HIDDEN = 64
 """Channels of the side head."""
+CERTAIN = 10.0
+"""Logit of a side that is not in question."""
 POINTNET_DROPOUT = 0.5
 
 
@@ -41,6 +43,13 @@ class Side(nn.Module):
         return self.last(torch.relu(self.hidden(features)).mean(1))
 
 
+class NoSide(nn.Module):
+    """What a network says that was not taught sides: coordinates are right as they are."""
+
+    def forward(self, features: Tensor) -> Tensor:
+        return features.new_tensor([CERTAIN, 0.0]).expand(len(features), HALF_TURNS)
+
+
 class ImageNetwork(nn.Module):
     """HRNet and a head.
 
@@ -57,7 +66,7 @@ class ImageNetwork(nn.Module):
             inputs, preset.width, preset.modules, preset.blocks, preset.bottlenecks, preset.stem, preset.norm
         )
         self.head = Head(preset.channels, preset.hidden, bins=preset.bins, normed=preset.head_norm)
-        self.side = Side(preset.channels)
+        self.side = Side(preset.channels) if preset.side else NoSide()
         self.category = nn.Embedding(categories, preset.stem) if categories > 1 else None
 
     def forward(self, image: Tensor, points: Tensor, category: Tensor) -> Prediction:
@@ -92,7 +101,7 @@ class PointNetwork(nn.Module):
         super().__init__()
         self.backbone = PointNet()
         self.head = Head(preset.channels, preset.hidden, preset.hidden, bins=preset.bins, dropout=POINTNET_DROPOUT)
-        self.side = Side(preset.channels)
+        self.side = Side(preset.channels) if preset.side else NoSide()
         self.category = nn.Embedding(categories, 3) if categories > 1 else None
 
     def forward(self, cloud: Tensor, category: Tensor) -> Prediction:

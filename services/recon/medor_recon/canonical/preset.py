@@ -31,7 +31,7 @@ class Preset:
         pixels: of each view that are learnt from at a time; the points that `pointnet` sees.
         batch: views of a step.
         lr: highest learning rate.
-        side: weight of the loss that teaches which side is up.
+        side: weight of the loss that teaches which side is up; 0 for none, and the answer that all is as it is.
     """
 
     network: Literal["hrnet", "pointnet"] = "hrnet"

@@ -38,7 +38,9 @@ def rotations(category: str, device: torch.device | str = "cpu") -> Tensor:
 
 def turned(nocs: Tensor, matrices: Tensor) -> Tensor:
     """(K, ..., 3) coordinates (..., 3) in the cube turned about its middle by K matrices."""
-    return torch.einsum("kij,...j->k...i", matrices, nocs - 0.5) + 0.5
+    shape = (len(matrices), *[1] * (nocs.ndim - 1), 3, 3)
+    # Not a matrix product: autocast would round coordinates to a quarter of a bin.
+    return (matrices.view(shape) * (nocs - 0.5)[..., None, :]).sum(-1) + 0.5
 
 
 def turned_points(nocs: np.ndarray, category: str, turn: int) -> np.ndarray:
