@@ -64,9 +64,9 @@ def test_the_loss_of_a_batch_is_the_mean_over_its_views_whatever_their_category(
     task.module = Sure()
     category = torch.tensor([0, 1, 1, 1])
     side = PRESET.side * np.log(2)  # of the one shirt, undecided
-    alone = task.loss_of(Batch((said[3:],), category[3:], nocs[3:], np.zeros(0)))
+    alone = task.loss_of(Batch((said[3:],), category[3:], nocs[3:], np.zeros(0, np.float32)))
     assert alone > 5
-    together = task.loss_of(Batch((said,), category, nocs, np.zeros(0)))
+    together = task.loss_of(Batch((said,), category, nocs, np.zeros(0, np.float32)))
     assert float(together) == pytest.approx((float(alone) + side) / 4, rel=1e-4)
 
 
