@@ -12,6 +12,7 @@ from medor_cloth.cloth import Cloth
 from medor_cloth.picker import pick_place
 from medor_cloth.raster import visible_vertices
 from medor_cloth.solver import Solver
+from medor_dynamics.frame import headings, turned
 from medor_dynamics.model import Dynamics
 from medor_dynamics.node_mesh import NodeMesh
 from medor_dynamics.preset import CPU, PULL_STEPS, STEPS, Preset
@@ -66,13 +67,14 @@ def recording_of(mesh: ClothMesh, pull: np.ndarray) -> Recording:
     frames = pick_place(solver, solver.rest(mesh.vertices), pick, pick + pull, record_every=5).frames
     frames = np.concatenate([mesh.vertices[None], frames, np.repeat(frames[-1:], STEPS, axis=0)])[: STEPS + 1]
     nodes = NodeMesh.of(mesh)
+    along = -headings(pull[None], CPU)
     return Recording(
         category=mesh.category,
-        positions=frames[:, nodes.ids],
+        positions=turned(frames[:, nodes.ids], along),
         edges=nodes.edges,
         rest=nodes.rest_lengths(mesh.vertices[nodes.ids], CPU),
         node=nodes.node_of(0),
-        step=pull / np.float32(PULL_STEPS),
+        step=turned(pull[None] / PULL_STEPS, along)[0, 0],
     )
 
 

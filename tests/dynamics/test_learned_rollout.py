@@ -101,7 +101,7 @@ def test_a_rollout_that_leaves_the_numbers_leaves_alone(cloth, model):
     fine = roll_out(learnt.predictor(), graph, positions, pulls, chunk=3)
     pulls.displacements[1] = 1e30
     after = roll_out(learnt.predictor(), graph, positions, pulls, chunk=3)
-    assert not np.isfinite(after[1]).all()
+    assert not (np.abs(after[1]) < 1e3).all()
     np.testing.assert_allclose(after[[0, 2]], fine[[0, 2]], atol=1e-6)
 
 

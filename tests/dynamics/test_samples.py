@@ -6,7 +6,6 @@ import pytest
 import zarr
 
 from medor_cloth.dataset import FORMAT, STORED, Dataset
-from medor_cloth.garment import Garment
 from medor_dynamics.evaluate import motionless_errors, rigid_errors
 from medor_dynamics.preset import CPU, PAPER, PULL_STEPS, STEP_S, STEPS
 from medor_dynamics.samples import Recording, Sampler, recordings, seen, stretches
@@ -60,7 +59,7 @@ def test_a_mirror_changes_sides_and_nothing_else(folded):
     mirrored = folded.mirrored()
     np.testing.assert_array_equal(mirrored.mirrored().positions, folded.positions)
     np.testing.assert_allclose(rigid_errors([mirrored]), rigid_errors([folded]), rtol=1e-6)
-    assert mirrored.step[1] == -folded.step[1] != 0
+    np.testing.assert_array_equal(mirrored.positions[..., 1], -folded.positions[..., 1])
 
 
 def test_turning_keeps_lengths_and_heights(folded):
@@ -113,7 +112,6 @@ def test_a_trajectory_of_a_data_set_as_the_model_sees_it(tmp_path, sheet, preset
     write_shard(tmp_path, mesh, frames, np.stack([squeezed[0], squeezed[0] + pull]), nodes)
     (seen_by_model,) = recordings(Dataset(tmp_path), preset)
     assert seen_by_model.positions.shape == (STEPS + 1, len(nodes.ids), 3)
-    assert Garment("tshirt", 1, mesh.vertices, mesh.faces, None).category == seen_by_model.category
     total = seen_by_model.positions[-1] - seen_by_model.positions[0]
     expected = [0.05, 0, 0.05] if preset.frame == "pull" else pull
     np.testing.assert_allclose(total, np.broadcast_to(expected, total.shape), atol=2e-4)

@@ -28,18 +28,18 @@ def rollout_errors(
 ) -> NDArray[np.float64]:
     """(R, 16) distance of the nodes from where they were recorded, mean over nodes, after each step [m]."""
     predictor = model.predictor(dtype)
-    errors = [rolled for few in in_parts(recordings) for rolled in errors_of(predictor, few)]
+    errors = [rolled for few in in_parts(recordings) for rolled in errors_of(predictor, few, model.device)]
     return np.array(errors)
 
 
-def errors_of(predictor: Predictor, recordings: Sequence[Recording]) -> NDArray[np.float64]:
+def errors_of(predictor: Predictor, recordings: Sequence[Recording], device: torch.device) -> NDArray[np.float64]:
     """`rollout_errors` of a few recordings at once."""
     starts = [0] * len(recordings)
-    batch = stretches(recordings, starts, [each.before(0) for each in recordings], STEPS)
+    batch = stretches(recordings, starts, [each.before(0) for each in recordings], STEPS).to(device)
     motion, errors = batch.motion, []
     for grip, target in zip(batch.grips, batch.targets, strict=True):
         motion = predictor(batch.graphs, motion, grip)
-        distance = (motion.positions - target).norm(dim=1).numpy()
+        distance = (motion.positions - target).norm(dim=1).cpu().numpy()
         errors.append(np.add.reduceat(distance, batch.graphs.starts[:-1]) / np.diff(batch.graphs.starts))
     return np.array(errors).T
 

@@ -31,7 +31,7 @@ class Foresight:
         For a single step that is the squared error of the acceleration, as in the paper. The node held goes where it
         goes: its acceleration is neither used nor learnt.
         """
-        batch = self._sampler.draw(step)
+        batch = self._sampler.draw(step).to(self._model.device)
         unit = self._model.normalizer.acceleration_scale * STEP_S**2
         motion, squares = batch.motion, []
         for grip, target in zip(batch.grips, batch.targets, strict=True):

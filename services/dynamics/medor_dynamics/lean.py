@@ -36,6 +36,10 @@ class LeanNetwork:
 
     def __call__(self, nodes: Tensor, edges: Tensor, wiring: Wiring) -> Tensor:
         """(N, 18) node features and (E, 7) edge features -> (N, 3)."""
+        with torch.autocast("cpu", enabled=False):  # it has a precision of its own
+            return self._forward(nodes, edges, wiring)
+
+    def _forward(self, nodes: Tensor, edges: Tensor, wiring: Wiring) -> Tensor:
         nodes, edges = self._encode_nodes(nodes), self._encode_edges(edges)
         shared = nodes.new_zeros(wiring.graphs, self._width)
         nodes_out, scratch = nodes, (torch.empty_like(edges), torch.empty_like(edges))

@@ -23,6 +23,8 @@ from medor_wire.errors import BadRequest
 from medor_wire.messages import ClothMesh, RolloutProgress, RolloutRequest, Rollouts
 
 TRAINING = "python -m medor_dynamics.train --preset cpu --data DIR --test DIR --out DIR --hours 4"
+LEFT_M = 2.0
+"""A rollout with a vertex farther than this from the middle of the table along an axis has diverged [m]."""
 
 
 class Learned:
@@ -47,7 +49,7 @@ class Learned:
         positions = np.repeat(mesh.vertices[None], total, axis=0)
         grasping = np.flatnonzero(held >= 0)
         positions[grasping] = self._follow(nodes, request, held, grasping, call)
-        diverged = ~np.isfinite(positions).reshape(total, -1).all(axis=1)
+        diverged = ~(np.abs(positions) < LEFT_M).reshape(total, -1).all(axis=1)
         positions[diverged] = mesh.vertices
         scores = rewards(positions, mesh.faces, request.reward, threads=self._threads)
         return Rollouts(
@@ -75,7 +77,8 @@ class Learned:
             check=call.check,
             on_done=lambda done: call.progress(RolloutProgress(done=done + total - len(pulls), total=total)),
         )
-        return nodes.follow(request.mesh.vertices, after)
+        with np.errstate(invalid="ignore", over="ignore"):  # diverged rollouts are told by where they end
+            return nodes.follow(request.mesh.vertices, after)
 
 
 class Untrained:

@@ -59,9 +59,13 @@ class Dynamics(nn.Module):
         """The nodes one step later."""
         return Predictor(self.preset, self.normalizer, self.network)(graphs, motion, grip)
 
+    @property
+    def device(self) -> torch.device:
+        return self.normalizer.node_scale.device
+
     def predictor(self, dtype: torch.dtype = torch.float32) -> "Predictor":
         """The model as it is now, made ready for rollouts on its device, hidden values in a precision."""
-        on_cpu = self.normalizer.node_scale.device.type == "cpu"
+        on_cpu = self.device.type == "cpu"
         network = LeanNetwork(self.network, dtype) if on_cpu else deepcopy(self.network).to(dtype)
         return Predictor(self.preset, self.normalizer, network, dtype)
 

@@ -89,7 +89,7 @@ def roll_chunk(
     steps = torch.from_numpy(turned(pulls.displacements[:, None] / PULL_STEPS, -angles)[:, 0]).to(device)
     for grip in grips(nodes, steps):
         motion = predictor(graphs, motion, grip)
-    with np.errstate(invalid="ignore"):  # a rollout that left the finite numbers is told by its result
+    with np.errstate(invalid="ignore", over="ignore"):  # a rollout that left the finite numbers is told by its result
         return turned(motion.positions.reshape(len(pulls), *positions.shape).cpu().numpy(), angles)
 
 

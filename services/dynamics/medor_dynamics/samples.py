@@ -47,7 +47,7 @@ class Recording:
     def turned(self, angle: float) -> "Recording":
         """The same turned about z [rad]."""
         angles = np.array([angle])
-        return replace(self, positions=turned(self.positions, angles), step=turned(self.step[None], angles)[0])
+        return replace(self, positions=turned(self.positions, angles), step=turned(self.step[None], angles)[0, 0])
 
     def before(self, first: int) -> NDArray[np.float32]:
         """(6, n, 3) positions up to record `first`, oldest first; before the action the cloth lies still."""
@@ -75,7 +75,7 @@ def recording(trajectory: Trajectory, mesh: NodeMesh, preset: Preset, visible_on
         edges=mesh.edges,
         rest=mesh.rest_lengths(positions[0], preset),
         node=mesh.node_of(int(trajectory["grasp"][1])),
-        step=turned((place - pick)[None] / PULL_STEPS, back)[0],
+        step=turned((place - pick)[None] / PULL_STEPS, back)[0, 0],
     )
     return seen(whole, trajectory["visible"]) if visible_only else whole
 
@@ -110,6 +110,12 @@ class Batch:
     motion: Motion
     grips: list[Grip]
     targets: Tensor
+
+    def to(self, device: torch.device) -> "Batch":
+        """The same on a device."""
+        motion = Motion(self.motion.positions.to(device), self.motion.velocities.to(device))
+        grips = [Grip(grip.nodes.to(device), grip.displacement.to(device)) for grip in self.grips]
+        return Batch(self.graphs, motion, grips, self.targets.to(device))
 
 
 @dataclass(frozen=True)

@@ -70,9 +70,8 @@ def main(options: Options) -> None:
     if (training.split, test.split) != ("train", "test"):
         raise SystemExit(f"expected splits train and test, got {training.split} and {test.split}")
     torch.manual_seed(options.seed)
-    device = "cuda" if torch.cuda.is_available() else "cpu"
     task = Foresight(
-        Dynamics(preset).to(device),
+        Dynamics(preset),
         Sampler(
             recordings(training, preset, visible_only=options.visible_only),
             options.batch,
@@ -84,6 +83,7 @@ def main(options: Options) -> None:
         ),
         spread(recordings(test, preset, visible_only=options.visible_only), options.validate_on),
     )
+    task.module.to("cuda" if torch.cuda.is_available() else "cpu")
     schedule = Schedule(
         steps=options.steps,
         hours=options.hours,
