@@ -7,10 +7,11 @@ from scipy.spatial import KDTree
 
 from medor_recon.canonicalized import Canonicalized
 from medor_recon.completed import Completed
+from medor_recon.completion.pixels import Pixels
 from medor_wire.errors import ReconstructionFailed
 
-MIN_PIXELS = 50
-"""Fewer pixels on the cloth than this say nothing about the rest."""
+MIN_PIXELS = 30
+"""Fewer pixels on the cloth than this, thinned as the network wants them, say nothing about the rest."""
 MIN_FACES = 200
 """A surface of fewer faces is a scrap."""
 MAX_DISTANCE_M = 0.05
@@ -29,15 +30,15 @@ class Completion(Protocol):
         ...
 
 
-def check_seen(seen: Canonicalized) -> None:
+def check_pixels(pixels: Pixels) -> None:
     """Refuse views that cannot be completed.
 
     Raises:
         ReconstructionFailed: too few pixels on the cloth, or values that are not numbers.
     """
-    if len(seen.points) < MIN_PIXELS:
-        raise ReconstructionFailed(f"expected at least {MIN_PIXELS} pixels on the cloth, got {len(seen.points)}")
-    if not (np.isfinite(seen.points).all() and np.isfinite(seen.nocs).all()):
+    if len(pixels.points) < MIN_PIXELS:
+        raise ReconstructionFailed(f"expected at least {MIN_PIXELS} pixels on the cloth, got {len(pixels.points)}")
+    if not (np.isfinite(pixels.points).all() and np.isfinite(pixels.nocs).all()):
         raise ReconstructionFailed("expected finite points and canonical coordinates, got some that are not")
 
 

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from medor_cloth.nocs import NOCS
 from medor_recon.completion.decoder import Decoder
+from medor_recon.completion.frame import WORLD, Frame, garment_frame, laid_flat
 from medor_recon.completion.pixels import Pixels
 from medor_recon.completion.scatter import nearest_node, sample, scatter_max
 from medor_recon.completion.unet3d import UNet3d
@@ -34,6 +35,8 @@ class FieldConfig:
         decoder: hidden widths of both decoders.
         batch_norm: in aggregation and decoders.
         relative: the warp is added to the canonical point; False for GarmentNets and the ablation `no-relative`.
+        framed: the table is seen from the garment's frame, and the warp starts from the garment laid flat in it;
+            otherwise both are as published: world frame, and the canonical point as it stands.
         position_weight: of the squared position error [1/m²] beside that of the winding number.
         nodes: along each side, of the grid the surface is taken from.
     """
@@ -47,6 +50,7 @@ class FieldConfig:
     decoder: tuple[int, ...] = (256, 256)
     batch_norm: bool = True
     relative: bool = True
+    framed: bool = False
     position_weight: float = 1.0
     nodes: int = 128
 
@@ -68,8 +72,12 @@ class Field(nn.Module):
         self.to_winding = Decoder(config.volume_features, config.decoder, 1, config.batch_norm)
         self.to_position = Decoder(config.volume_features + 3, config.decoder, 3, config.batch_norm)
 
+    def frame(self, view: Pixels) -> Frame:
+        """The frame that a view is to be given in, and positions come in."""
+        return garment_frame(view) if self.config.framed else WORLD
+
     def volume(self, views: list[Pixels]) -> Tensor:
-        """Completed features (B, C, G, G, G), indexed [x, y, z], of B views."""
+        """Completed features (B, C, G, G, G), indexed [x, y, z], of B views in their `frame`."""
         device = next(self.parameters()).device
         points = torch.cat([self._inputs(view, device) for view in views])
         nocs = torch.cat([torch.as_tensor(view.nocs, device=device) for view in views])
@@ -84,25 +92,28 @@ class Field(nn.Module):
         return self.to_winding(sample(volume, queries))[..., 0].float()
 
     def positions(self, volume: Tensor, queries: Tensor, canonical: Tensor) -> Tensor:
-        """Where canonical points lie on the table (B, Q, 3), world frame [m].
+        """Where canonical points lie on the table (B, Q, 3), in the view's `frame` [m].
 
         Args:
             queries: (B, Q, 3) in the NOCS cube.
             canonical: (B, Q, 3) the same points in metres.
         """
         warp = self.to_position(torch.cat([sample(volume, queries), canonical / LENGTH_M], dim=-1)).float() * LENGTH_M
-        return canonical + warp if self.config.relative else warp
+        if not self.config.relative:
+            return warp
+        return warp + (laid_flat(canonical) if self.config.framed else canonical)
 
     def warp(self, pixels: Pixels, canonical: NDArray[np.float32]) -> NDArray[np.float32]:
         """Where canonical points (Q, 3) [m] of the garment in a view lie on the table (Q, 3), world frame [m]."""
         with torch.inference_mode():
-            return self.warp_in(self.volume([pixels]), pixels.category, canonical)
+            return self.warp_in(self.volume([self.frame(pixels).view(pixels)]), pixels, canonical)
 
-    def warp_in(self, volume: Tensor, category: str, canonical: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The same from a completed volume (1, C, G, G, G)."""
+    def warp_in(self, volume: Tensor, pixels: Pixels, canonical: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The same from the view's completed volume (1, C, G, G, G)."""
         with torch.inference_mode():
-            queries = torch.from_numpy(NOCS[category].encode(canonical))[None].to(volume.device)
-            return self.positions(volume, queries, torch.from_numpy(canonical)[None].to(volume.device))[0].cpu().numpy()
+            queries = torch.from_numpy(NOCS[pixels.category].encode(canonical))[None].to(volume.device)
+            found = self.positions(volume, queries, torch.from_numpy(canonical)[None].to(volume.device))
+            return self.frame(pixels).outward(found[0].cpu().numpy())
 
     def _inputs(self, view: Pixels, device: torch.device) -> Tensor:
         """Inputs of a view's pixels (P, features + 9 + categories): features, offset to the node, point, confidence."""

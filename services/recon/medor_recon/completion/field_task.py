@@ -1,5 +1,6 @@
 """Learning the winding-number field and the warp field (`medor_learn.loop.Task`)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,13 +58,14 @@ class FieldTask:
     def _errors(self, items: list[Example], asked: list[Queries]) -> tuple[Tensor, Tensor]:
         """Mean squared errors of winding number and position, the latter a coordinate [m²]."""
         field = self.module
-        volume = field.volume([item.pixels for item in items])
+        frames = [field.frame(item.pixels) for item in items]
+        volume = field.volume([frame.view(item.pixels) for frame, item in zip(frames, items, strict=True)])
 
-        def stacked(name: str) -> Tensor:
-            return torch.from_numpy(np.stack([getattr(one, name) for one in asked])).to(volume.device)
+        def stacked(parts: Iterable[np.ndarray]) -> Tensor:
+            return torch.from_numpy(np.stack(list(parts))).to(volume.device)
 
         surface = [NOCS[item.pixels.category].decode(one.surface) for item, one in zip(items, asked, strict=True)]
-        canonical = torch.from_numpy(np.stack(surface)).to(volume.device)
-        winding = field.winding(volume, stacked("volume"))
-        positions = field.positions(volume, stacked("surface"), canonical)
-        return F.mse_loss(winding, stacked("winding")), F.mse_loss(positions, stacked("positions"))
+        true = stacked(frame.inward(one.positions) for frame, one in zip(frames, asked, strict=True))
+        winding = field.winding(volume, stacked(one.volume for one in asked))
+        positions = field.positions(volume, stacked(one.surface for one in asked), stacked(surface))
+        return F.mse_loss(winding, stacked(one.winding for one in asked)), F.mse_loss(positions, true)

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from medor_cloth.nocs import NOCS
 from medor_recon.completion.decoder import Decoder
 from medor_recon.completion.field import LENGTH_M
-from medor_recon.completion.heading import headed, heading
+from medor_recon.completion.frame import garment_frame
 from medor_recon.completion.pixels import Pixels
 
 
@@ -79,7 +79,7 @@ class FillInputs:
     Attributes:
         summary: (pooled, 7 + categories).
         points: (Q, 7 K + 7 + categories).
-        filled: (Q, 3) world frame [m].
+        filled: (Q, 3) garment's frame [m].
     """
 
     summary: NDArray[np.float32]
@@ -90,12 +90,8 @@ class FillInputs:
 def fill_inputs(
     pixels: Pixels, canonical: NDArray[np.floating], config: FillConfig, categories: tuple[str, ...]
 ) -> FillInputs:
-    """Features of the points and of the view.
-
-    World positions are relative to the middle of the visible points.
-    """
+    """Features of the points and of the view, whose points are in the garment's frame."""
     seen = NOCS[pixels.category].decode(pixels.nocs)
-    middle = pixels.points.mean(axis=0)
     sure = pixels.confidence.mean(axis=1, keepdims=True)
     filled = fill(pixels, canonical, config.neighbours, config.softness)
     near = filled.neighbours
@@ -108,10 +104,10 @@ def fill_inputs(
         axis=2,
     )
     kind = np.array([name == pixels.category for name in categories] if len(categories) > 1 else [], np.float32)
-    own = [canonical / LENGTH_M, (filled.positions - middle) / LENGTH_M, filled.distances[:, :1] / LENGTH_M]
+    own = [canonical / LENGTH_M, filled.positions / LENGTH_M, filled.distances[:, :1] / LENGTH_M]
     points = np.concatenate([around.reshape(len(canonical), -1), *own, np.tile(kind, (len(canonical), 1))], axis=1)
     pooled = np.linspace(0, len(seen) - 1, config.pooled).round().astype(int)
-    view = [(pixels.points - middle)[pooled] / LENGTH_M, seen[pooled] / LENGTH_M, sure[pooled]]
+    view = [pixels.points[pooled] / LENGTH_M, seen[pooled] / LENGTH_M, sure[pooled]]
     summary = np.concatenate([*view, np.tile(kind, (config.pooled, 1))], axis=1)
     return FillInputs(summary.astype(np.float32), points.astype(np.float32), filled.positions)
 
@@ -127,15 +123,15 @@ class PooledFill(nn.Module):
         self.residual = Decoder(7 * config.neighbours + 7 + kinds + config.summary, config.hidden, 3)
 
     def forward(self, summary: Tensor, points: Tensor, filled: Tensor) -> Tensor:
-        """Positions (B, Q, 3), world frame [m], of a batch of `FillInputs`."""
+        """Positions (B, Q, 3), garment's frame [m], of a batch of `FillInputs`."""
         pooled = self.summary(summary).amax(dim=1, keepdim=True).expand(-1, points.shape[1], -1)
         return filled + self.residual(torch.cat([points, pooled], dim=2)).float() * LENGTH_M
 
     def positions(self, pixels: Pixels, canonical: NDArray[np.floating]) -> NDArray[np.float32]:
         """Where canonical points (Q, 3) [m] lie on the table: (Q, 3) world frame [m]."""
-        R = heading(pixels)
-        inputs = fill_inputs(headed(pixels, R), canonical, self.config, self.categories)
+        frame = garment_frame(pixels)
+        inputs = fill_inputs(frame.view(pixels), canonical, self.config, self.categories)
         device = next(self.parameters()).device
         with torch.inference_mode():
             batch = (torch.from_numpy(part[None]).to(device) for part in (inputs.summary, inputs.points, inputs.filled))
-            return self(*batch)[0].cpu().numpy() @ R.T
+            return frame.outward(self(*batch)[0].cpu().numpy())

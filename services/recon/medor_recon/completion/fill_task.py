@@ -10,7 +10,7 @@ from torch.nn import functional as F
 from medor_recon.completion.augment import Augmentation, Example, varied
 from medor_recon.completion.field import LENGTH_M
 from medor_recon.completion.fill import FillInputs, PooledFill, fill_inputs
-from medor_recon.completion.heading import headed, heading
+from medor_recon.completion.frame import garment_frame
 from medor_recon.completion.material import Material
 from medor_recon.completion.measures import canonical_of, warp_errors
 from medor_recon.completion.observations import CAMERA
@@ -49,9 +49,9 @@ class FillTask:
     def _points(self, item: Example, rng: np.random.Generator) -> tuple[FillInputs, np.ndarray]:
         chosen = rng.integers(len(item.nocs), size=self.vertices)
         canonical = canonical_of(item)[chosen] + rng.normal(0, JITTER_M, (self.vertices, 3))
-        R = heading(item.pixels)
-        inputs = fill_inputs(headed(item.pixels, R), canonical, self.module.config, self.module.categories)
-        return inputs, item.positions[chosen] @ R
+        frame = garment_frame(item.pixels)
+        inputs = fill_inputs(frame.view(item.pixels), canonical, self.module.config, self.module.categories)
+        return inputs, frame.inward(item.positions[chosen])
 
 
 def _stacked(inputs: list[FillInputs], device: torch.device) -> tuple[Tensor, ...]:

@@ -42,7 +42,7 @@ def choose_threshold(field: Field, examples: list[Example], rng: np.random.Gener
     steepness, true = [], []
     for item in examples:
         with torch.inference_mode():
-            winding = winding_grid(field, field.volume([item.pixels]))
+            winding = winding_grid(field, field.volume([field.frame(item.pixels).view(item.pixels)]))
         vertices, _, steep = closed_surface(winding)
         cloth, _ = on_surface(item, rng, CLOTH_SAMPLES, push=0.0)
         true.append(on_cloth(vertices, cloth, ON_CLOTH_M / NOCS[item.pixels.category].side))

@@ -38,7 +38,7 @@ def closed_surface(
     if not highest - lowest > MIN_RANGE:
         raise ReconstructionFailed(f"the winding field tells no inside from outside: {lowest:.2f} to {highest:.2f}")
     level = LEVEL if lowest < LEVEL < highest else (lowest + highest) / 2
-    nodes, faces, _, _ = marching_cubes(winding, level, gradient_direction="descent")
+    nodes, faces, _, _ = marching_cubes(winding, level, gradient_direction="ascent")
     steepness = gaussian_gradient_magnitude(winding.astype(np.float32), SIGMA, mode="nearest")
     at_vertices = map_coordinates(steepness, nodes.T, order=1, mode="nearest")
     return (nodes / (len(winding) - 1)).astype(np.float32), faces.astype(np.int32), np.asarray(at_vertices, np.float32)
@@ -55,7 +55,12 @@ def opened(
     kept = faces[(steepness > threshold)[faces].any(axis=1)]
     if len(kept) == 0:
         raise ReconstructionFailed(f"no cloth in the winding field: its gradient stays below {threshold:.3f}")
-    used, renumbered = np.unique(kept, return_inverse=True)
+    return compact(vertices, kept)
+
+
+def compact(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """The vertices that have a face, and the faces renumbered."""
+    used, renumbered = np.unique(faces, return_inverse=True)
     return vertices[used], renumbered.reshape(-1, 3).astype(np.int32)
 
 

@@ -42,6 +42,7 @@ PAPER_SMALL = Preset(
         volume_features=32,
         decoder=(256, 256, 256),
         batch_norm=False,
+        framed=True,
         position_weight=100.0,
         nodes=64,
     ),

@@ -4,6 +4,7 @@ A library holds the medoids of a category's training garments. The one whose sur
 canonical points is taken, one way only: nothing is known of what is hidden.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 
@@ -42,7 +43,11 @@ class Templates:
 
     @classmethod
     def of(
-        cls, category: str, seeds: list[int], nocs: list[NDArray[np.floating]], faces: list[NDArray[np.integer]]
+        cls,
+        category: str,
+        seeds: Sequence[int],
+        nocs: Sequence[NDArray[np.floating]],
+        faces: Sequence[NDArray[np.integer]],
     ) -> "Templates":
         """A library of meshes, each vertices (V, 3) in the NOCS cube and faces (F, 3)."""
         vertices = STORED.load(STORED.store(np.concatenate(nocs)))
@@ -97,7 +102,7 @@ class Templates:
             return cls(str(file["category"]), file["seeds"], STORED.load(file["nocs"]), faces, *starts)
 
 
-def medoids(nocs: list[NDArray[np.floating]], number: int) -> list[int]:
+def medoids(nocs: Sequence[NDArray[np.floating]], number: int) -> list[int]:
     """Indices of the shapes that stand for all: each next one lowers the mean distance to the nearest medoid most.
 
     Args:
@@ -115,7 +120,7 @@ def medoids(nocs: list[NDArray[np.floating]], number: int) -> list[int]:
     return chosen
 
 
-def chamfer_matrix(nocs: list[NDArray[np.floating]]) -> NDArray[np.float64]:
+def chamfer_matrix(nocs: Sequence[NDArray[np.floating]]) -> NDArray[np.float64]:
     """(T, T) mean distance of two shapes' vertices to each other's nearest, both ways."""
     trees = [KDTree(shape) for shape in nocs]
     one_way_means = np.array([[tree.query(shape)[0].mean() for tree in trees] for shape in nocs])

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from medor_recon.canonicalized import Canonicalized
 from medor_recon.completed import Completed
-from medor_recon.completion.completion import check_completed, check_seen
+from medor_recon.completion.completion import check_completed, check_pixels
 from medor_recon.completion.fill import PooledFill
 from medor_recon.completion.pixels import thinned
 from medor_recon.completion.template import Templates
@@ -24,12 +24,12 @@ class TemplateCompletion:
 
     def complete(self, seen: Canonicalized) -> Completed:
         """See `Completion`."""
-        check_seen(seen)
         templates = self.templates.get(seen.category)
         if templates is None:
             known = ", ".join(sorted(self.templates))
             raise ReconstructionFailed(f"no templates of category {seen.category!r}, only of {known}")
         pixels = thinned(seen, self.fill.config.spacing)
+        check_pixels(pixels)
         chosen = templates.nearest(pixels)
         canonical = templates.canonical(chosen)
         completed = Completed(canonical, templates[chosen][1], self.fill.positions(pixels, canonical))
