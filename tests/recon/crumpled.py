@@ -3,7 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from medor_cloth.camera import overhead
 from medor_cloth.garment import Garment, generate
@@ -71,7 +71,7 @@ def filled(view: Canonicalized) -> Completed:
     The error is that of a completion which has learnt nothing.
     """
     shirt = garment()
-    distance, near = cKDTree(NOCS["tshirt"].decode(view.nocs)).query(shirt.vertices, k=8)
+    distance, near = KDTree(NOCS["tshirt"].decode(view.nocs)).query(shirt.vertices, k=8)
     weights = 1 / (distance + 0.005) ** 2
     positions = (weights[..., None] * view.points[near]).sum(axis=1) / weights.sum(axis=1, keepdims=True)
     return Completed(shirt.vertices, shirt.faces, positions.astype(np.float32))

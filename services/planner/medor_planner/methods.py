@@ -29,7 +29,17 @@ ORACLE_MESH = Method("oracle-mesh", recon=None, dynamics="learned", goals="mesh"
 RANDOM = Method("random", recon="visible", dynamics=None)
 """A pick near the outline, a place off the cloth (MEDOR, robot baseline)."""
 
-METHODS = {method.name: method for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM)}
+MEDOR = Method("medor", recon="medor", dynamics="learned", goals="mesh")
+"""The mesh completed from the view and finetuned on it, rolled out by the learned model; goals are made of its own
+canonical pose (MEDOR)."""
+COMPLETED = (MEDOR,) + tuple(
+    Method(f"{recon}+physics", recon=recon, dynamics="physics", goals="mesh")
+    for recon in ("medor", "held", "no-finetuning", "joint", "no-consistency", "no-relative", "garmentnets")
+)
+"""The completed mesh, rolled out by the cloth solver: MEDOR's "ground-truth dynamics" and the ablations of its
+reconstruction."""
+
+METHODS = {method.name: method for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM, *COMPLETED)}
 
 
 def method_named(name: str) -> Method:

@@ -29,7 +29,7 @@ METHODS = {
         Method("field", completion="paper-small"),
         Method("field-no-finetuning", completion="paper-small", refine=None),
         Method("no-relative", completion="paper-small-no-relative", refine=None),
-        Method("garmentnets", canonical="garmentnets", completion="garmentnets", refine=None),
+        Method("garmentnets", canonical="garmentnets-small", completion="paper-small-no-relative", refine=None),
     )
 }
 """`medor` and its ablations (MEDOR, section V-D): `joint`, `no-consistency` and `no-finetuning` differ from it in

@@ -1,12 +1,19 @@
-"""Trained networks by preset and category: the shipped ones, or those of another folder."""
+"""Trained networks by preset and category: the shipped ones, or those of another folder.
 
-from functools import lru_cache
+torch takes seconds to import and is not needed to see what is visible: it is imported with the first network.
+"""
+
+from __future__ import annotations
+
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from medor_recon.canonical.canonicalizer import Canonicalizer
-from medor_recon.completion import weights as completions
-from medor_recon.completion.completion import Completion
 from medor_wire.errors import BadRequest
+
+if TYPE_CHECKING:
+    from medor_recon.canonical.canonicalizer import Canonicalizer
+    from medor_recon.completion.completion import Completion
 
 SHIPPED = Path(__file__).parent / "weights"
 """Weights that come with the package."""
@@ -22,8 +29,8 @@ class Networks:
 
     def __init__(self, root: Path = SHIPPED, device: str = "cpu") -> None:
         self.root, self.device = root, device
-        self._canonicalizer = lru_cache(lambda folder: Canonicalizer.load(folder, device))
-        self._completion = lru_cache(lambda folder: completions.load(folder, device))
+        self._canonicalizer = cache(self._load_canonicalizer)
+        self._completion = cache(self._load_completion)
 
     def canonicalizer(self, preset: str, category: str) -> Canonicalizer:
         """Raises `BadRequest` where there are no weights."""
@@ -47,3 +54,13 @@ class Networks:
             f"no weights {' or '.join(names)} in {self.root.name}/; they are trained by `python -m medor_recon.train "
             f"{part} --preset {preset} --categories {category} --data <folder> --out <folder>`"
         )
+
+    def _load_canonicalizer(self, folder: Path) -> Canonicalizer:
+        from medor_recon.canonical.canonicalizer import Canonicalizer
+
+        return Canonicalizer.load(folder, self.device)
+
+    def _load_completion(self, folder: Path) -> Completion:
+        from medor_recon.completion import weights
+
+        return weights.load(folder, self.device)

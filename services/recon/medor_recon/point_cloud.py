@@ -1,6 +1,7 @@
 """The visible points of a garment, thinned to the nodes of VCD's voxel grid."""
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from medor_recon.open3d_import import open3d
 from medor_wire.errors import SeveralGarments
@@ -38,6 +39,12 @@ def one_garment(nodes: np.ndarray) -> np.ndarray:
         middles = [nodes[labels == k].mean(axis=0)[:2].round(3).tolist() for k in large]
         raise SeveralGarments(f"expected one garment in view, got {len(large)} around (x, y) = {middles}")
     return nodes[labels == sizes.argmax()]
+
+
+def near(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(N,) bool: points (N, 3) that belong to the same thing on the table as the nodes (V, 3)."""
+    distance, _ = KDTree(nodes[:, :2]).query(points[:, :2])
+    return distance <= GAP_M / 2
 
 
 def _vectors(points: np.ndarray):

@@ -1,6 +1,10 @@
 """Reconstruction service: one depth image of a garment in, its cloth mesh out."""
 
+from pathlib import Path
+
+from medor_recon.networks import SHIPPED, Networks
 from medor_recon.reconstructor import Reconstructor
+from medor_recon.whole import Trust
 from medor_wire import endpoints
 from medor_wire.bus import join
 from medor_wire.config import Settings
@@ -11,10 +15,20 @@ class Config(Settings, section="recon"):
     """What rises higher above the table [m] is garment, when no mask comes with the view."""
     min_area: float = 0.002
     """Least visible area [m²] that counts as a garment."""
+    weights: Path = SHIPPED
+    """Folder of trained networks."""
+    device: str = "cpu"
+    """Where networks run, as torch names it."""
+    min_confidence: float = Trust.min_confidence
+    """Least mean confidence of the canonical coordinates at which a view counts as understood."""
+    max_residual: float = Trust.max_residual_m
+    """Largest mean distance of the points seen to the reconstructed mesh [m]."""
 
 
 def main(config: Config) -> None:
-    reconstructor = Reconstructor(config.min_height, config.min_area)
+    trust = Trust(min_confidence=config.min_confidence, max_residual_m=config.max_residual)
+    networks = Networks(config.weights, config.device)
+    reconstructor = Reconstructor(config.min_height, config.min_area, networks, trust)
     with join("recon", config.bus) as wire:
         wire.serve(endpoints.RECONSTRUCT, reconstructor.reconstruct)
         wire.run()

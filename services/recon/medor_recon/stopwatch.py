@@ -19,6 +19,7 @@ class Stopwatch:
         self.timings_ms: dict[str, float] = {}
         self._clock = clock
         self._on_stage = on_stage
+        self._start = clock()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -27,3 +28,7 @@ class Stopwatch:
         start = self._clock()
         yield
         self.timings_ms[name] = (self._clock() - start) * 1e3
+
+    def total(self) -> dict[str, float]:
+        """All timings [ms], `total` since this watch was made among them."""
+        return {**self.timings_ms, "total": (self._clock() - self._start) * 1e3}

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from medor_cloth.camera import Camera
 from medor_cloth.nocs import NOCS
-from medor_cloth.raster import rasterize
+from medor_cloth.raster import rasterize, visible_vertices
 from medor_recon.canonicalized import Canonicalized
 from medor_recon.completed import Completed
 from medor_recon.refine import terms
@@ -23,7 +23,7 @@ class Refined:
 
     Attributes:
         positions: (V, 3) float32 world frame [m].
-        visible: (V,) bool, corners of a face that the camera sees.
+        visible: (V,) bool, with no cloth in front of them.
         residual_m: mean distance of the observed points to the nearest visible vertex.
         losses: of every iteration before its step, unweighted (N,) [m²], by the name of the term.
     """
@@ -56,11 +56,9 @@ def refine(completed: Completed, canonicalized: Canonicalized, config: RefineCon
         positions = problem.descend(positions, phase, losses)
     seen = visible(positions, completed.faces, canonicalized.camera)
     _, square = terms.nearest(problem.points, positions, seen)
-    mask = np.zeros(len(positions), bool)
-    mask[seen] = True
     return Refined(
         positions.astype(np.float32),
-        mask,
+        visible_vertices(positions, completed.faces, canonicalized.camera),
         float(np.sqrt(square).mean()),
         {name: np.array(values) for name, values in losses.items()},
     )
