@@ -1,6 +1,6 @@
 """How well the cloth behaves like cloth: `python -m benchmarks.fidelity`.
 
-Folds that stay and open, a pull that unfolds, rest, layers in depth, and what the step size and the mesh change. Prints
+Folds that stay and open, a pull that unfolds, rest, and what the step size and the mesh change. Prints
 one table a question and writes a picture of each; the same figures are asserted in `tests/cloth/test_fidelity.py`.
 """
 
@@ -18,7 +18,6 @@ from medor_cloth.garment import CATEGORIES, Garment, generate
 from medor_cloth.goals import flattened, solver_of
 from medor_cloth.intersection import self_intersections
 from medor_cloth.picker import pick_place
-from medor_cloth.raster import rasterize
 from medor_cloth.solver import ClothState, Solver
 from medor_cloth.start import dropped, picked
 
@@ -173,17 +172,6 @@ def rest(flat: Flat, seed: int) -> Rest:
     )
 
 
-def layer_step(flat: Flat) -> float:
-    """Height step at a corner fold [m] per layer of cloth: a garment's fold lays two layers over two."""
-    folded, _, _ = fold_corner(flat)
-    camera = overhead(360)
-    before = rasterize(flat.state.positions, flat.garment.faces, camera).depth
-    after = rasterize(folded.positions, flat.garment.faces, camera).depth
-    both = (before > 0) & (after > 0)
-    step = (before - after)[both]
-    return float(np.median(step[step > flat.solver.config.thickness])) / 2
-
-
 def settled_coverage(flat: Flat, seed: int, substeps: int | None = None) -> float:
     """Coverage after a lift and a drop, as a share of the flat one; with another number of substeps if given."""
     solver = flat.solver
@@ -241,15 +229,14 @@ def main(options: Options) -> None:
             )
             states = [flat.state, *corner.states, pull.state, slide.state, *half.states]
             _picture(options.out / f"folds-{category}-{seed}.png", flat, states)
-    print("\n| at rest | drift | tremble | stretched | compressed | held | crossings / 100 edges | layer step |")
-    print("|---|---|---|---|---|---|---|---|")
+    print("\n| at rest | drift | tremble | stretched | compressed | held | crossings / 100 edges |")
+    print("|---|---|---|---|---|---|---|")
     for category in CATEGORIES:
         flat = Flat(category, 800001)
         found = rest(flat, 0)
         print(
             f"| {category} | {100 * found.drift_m_s:.2f} cm/s | {100 * found.tremble_m_s:.1f} cm/s "
-            f"| {found.stretched:.1%} | {found.compressed:.1%} | {found.held:.1%} | {found.crossings:.2f} "
-            f"| {1000 * layer_step(flat):.1f} mm |",
+            f"| {found.stretched:.1%} | {found.compressed:.1%} | {found.held:.1%} | {found.crossings:.2f} |",
             flush=True,
         )
         _picture(options.out / f"rest-{category}.png", flat, [found.state])
