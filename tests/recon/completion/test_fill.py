@@ -40,12 +40,18 @@ def test_the_fill_stays_within_its_neighbours(pixels):
     assert (np.diff(filled.distances, axis=1) >= 0).all()
 
 
-def test_thinning_keeps_an_even_grid(seen):
+def test_thinning_keeps_one_pixel_of_each_block(seen):
     kept = thinned(seen, 0.008)
-    stride = round(0.008 / pixel_size(seen))
-    assert stride == 3
-    assert len(kept.points) == pytest.approx(len(seen.points) / stride**2, rel=0.05)
+    assert round(0.008 / pixel_size(seen)) == 3
+    assert len(kept.points) == len(np.unique(seen.pixels // 3, axis=0))
     assert len(thinned(seen, 0.0).points) == len(seen.points)
+
+
+def test_thinning_spares_what_is_thin_already(seen):
+    few = np.random.default_rng(0).permutation(len(seen.points))[:300]
+    parts = ("pixels", "points", "nocs", "confidence", "features")
+    kept = thinned(replace(seen, **{part: getattr(seen, part)[few] for part in parts}), 0.008)
+    assert len(kept.points) > 220
 
 
 def test_the_frame_of_a_garment_laid_front_up_is_the_world_and_turns_with_it(pixels):

@@ -61,10 +61,12 @@ def _changed(preset: Preset, **network: object) -> Preset:
     return replace(preset, network=replace(preset.network, **network))  # type: ignore[arg-type]
 
 
+# `garmentnets-small` differs from `paper-small-no-relative` by the canonicaliser that it is taught with.
 PRESETS = {
     "cpu": CPU,
     "paper-small": PAPER_SMALL,
     "paper-small-no-relative": _changed(PAPER_SMALL, relative=False),
+    "garmentnets-small": _changed(PAPER_SMALL, relative=False),
     "paper": PAPER,
     "paper-no-relative": _changed(PAPER, relative=False),
     "garmentnets": _changed(PAPER, features=128, aggregation=(137, 128), relative=False),

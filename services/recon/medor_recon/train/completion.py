@@ -39,7 +39,13 @@ def completion(
     data: tuple[Path, ...],
     out: Path,
     preset: Literal[
-        "cpu", "paper-small", "paper-small-no-relative", "paper", "paper-no-relative", "garmentnets"
+        "cpu",
+        "paper-small",
+        "paper-small-no-relative",
+        "garmentnets-small",
+        "paper",
+        "paper-no-relative",
+        "garmentnets",
     ] = "cpu",
     canonical: Path | None = None,
     predicted: float | None = None,
