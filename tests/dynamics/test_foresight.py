@@ -13,7 +13,7 @@ from medor_dynamics.samples import Recording, Sampler
 from medor_dynamics.shipped import build, load
 from medor_learn.loop import Schedule, train
 
-TINY = replace(CPU, width=24, blocks=2)
+TINY = replace(CPU, width=32, blocks=3)
 CARD = {"preset": {**vars(TINY)}}
 
 
@@ -22,15 +22,28 @@ def task_of(folded: Recording, **options) -> Foresight:
     return Foresight(Dynamics(TINY), Sampler([folded], **{"size": 4} | options), [folded])
 
 
+def test_one_recording_is_learnt(folded, tmp_path):
+    """Steps are foreseen far better than by going on as before, and the weights kept are those of the best score."""
+    task = task_of(folded, size=8)
+    summary = train(task, tmp_path, Schedule(steps=120, lr=3e-3, warm_up=20, validate_every=60), card=CARD)
+    going_on = task_of(folded, size=8)
+    torch.nn.init.zeros_(going_on.module.network.decode[4].weight)
+    torch.nn.init.zeros_(going_on.module.network.decode[4].bias)
+    with torch.no_grad():
+        learnt, naive = (np.mean([float(each.loss(step)) for step in range(10)]) for each in (task, going_on))
+    assert learnt < 0.6 * naive
+    kept = load(tmp_path / "best")
+    assert kept.preset == TINY
+    assert rollout_errors(kept, [folded])[:, -1] == pytest.approx(summary["best"]["score"], rel=1e-5)
+
+
+@pytest.mark.slow
 def test_one_recording_is_learnt_by_heart(folded, tmp_path):
-    """A model that has seen one pull often enough foresees it far better than that nothing moves."""
-    task = task_of(folded, size=8, noise=0.02)
-    before = task.validate()
-    train(task, tmp_path, Schedule(steps=250, lr=5e-3, warm_up=20, validate_every=125), card=CARD)
-    after = task.validate()
-    assert after["score"] < 0.35 * after["no_motion"]
-    assert after["score"] < 0.5 * before["score"]
-    assert load(tmp_path / "best").preset == TINY
+    """A model that has seen one pull often enough foresees all of it, far better than that nothing moves."""
+    task = task_of(folded, size=8, noise=0.01)
+    schedule = Schedule(steps=500, lr=3e-3, warm_up=20, validate_every=100)
+    best = train(task, tmp_path, schedule, card=CARD)["best"]
+    assert best["score"] < 0.5 * best["no_motion"]
 
 
 def test_the_unrolled_loss_of_one_step_is_the_squared_error_of_the_acceleration(folded):

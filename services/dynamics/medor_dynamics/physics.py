@@ -1,7 +1,7 @@
 """Backend `physics`: candidates rolled out by the cloth solver (MEDOR's ground-truth dynamics)."""
 
 import time
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from medor_cloth.cloth import Cloth
 from medor_cloth.errors import ClothError
 from medor_cloth.rollout import Cancelled as Stopped
 from medor_cloth.rollout import rollouts
-from medor_cloth.solver import Solver
+from medor_cloth.solver import Solver, SolverConfig
 from medor_dynamics.rewards import rewards
 from medor_wire.bus import Call
 from medor_wire.content import ByContent
@@ -24,9 +24,9 @@ DIVERGED_PENALTY = 1e6
 class Physics:
     """Rolls candidates out on a mesh with as many threads as it is given."""
 
-    def __init__(self, threads: int, keep: int = 8) -> None:
+    def __init__(self, threads: int, keep: int = 8, config: SolverConfig | None = None) -> None:
         self._threads = threads
-        self._solver_of = lru_cache(keep)(solver_of)
+        self._solver_of = lru_cache(keep)(partial(solver_of, config=config))
 
     def roll_out(self, request: RolloutRequest, call: Call) -> Rollouts:
         """Final positions and rewards of all candidates. Neither depends on the number of threads.
@@ -66,10 +66,10 @@ def by_rest_shape(mesh: ClothMesh) -> ByContent[ClothMesh]:
     return ByContent.of(mesh, mesh.faces, mesh.panel_uv if mesh.panel_uv is not None else rest_shape(mesh))
 
 
-def solver_of(mesh: ByContent[ClothMesh]) -> Solver:
+def solver_of(mesh: ByContent[ClothMesh], config: SolverConfig | None = None) -> Solver:
     """The solver of a mesh, at rest in its panels or else in its rest shape."""
     try:
-        return Solver(Cloth.from_mesh(rest_shape(mesh.value), mesh.value.faces, mesh.value.panel_uv))
+        return Solver(Cloth.from_mesh(rest_shape(mesh.value), mesh.value.faces, mesh.value.panel_uv), config)
     except ClothError as error:
         raise BadRequest(f"the mesh cannot be cloth: {error}") from error
 

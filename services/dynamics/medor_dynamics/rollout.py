@@ -15,7 +15,7 @@ from medor_dynamics.graphs import Graphs
 from medor_dynamics.model import Grip, Motion, Predictor
 from medor_dynamics.preset import PULL_STEPS, STEPS
 
-CHUNK = 4
+CHUNK = 5
 """Candidates in one batch on a CPU: their edges' hidden values about fill its second cache."""
 
 

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Literal
 
 import torch
+from pydantic import Field
 
+from medor_cloth.solver import SolverConfig
 from medor_dynamics.flatten import Flattener
 from medor_dynamics.learned import learned
 from medor_dynamics.physics import Physics
@@ -27,6 +29,8 @@ class Config(Settings, section="dynamics"):
     """Threads of one rollout request; 0: this replica's share of all processors."""
     replicas: int = 1
     """Replicas on this machine, which share its processors."""
+    softness: float = Field(default=1.0, gt=0)
+    """How many times as easily as usual the cloth of backend `physics` bends."""
     weights: Path = DEFAULT
     """Folder of the learned model, as training leaves it in `best`."""
     precision: Literal["bfloat16", "float32"] = "bfloat16"
@@ -37,7 +41,10 @@ def main(config: Config) -> None:
     threads = config.threads or -(-(os.cpu_count() or 1) // config.replicas)
     torch.set_num_threads(1)
     roller = Roller(
-        {"physics": Physics(threads), "learned": learned(config.weights, threads, PRECISIONS[config.precision])}
+        {
+            "physics": Physics(threads, config=SolverConfig().softer(config.softness)),
+            "learned": learned(config.weights, threads, PRECISIONS[config.precision]),
+        }
     )
     with join("dynamics", config.bus) as bus:
         bus.ready(False, "compiling")
