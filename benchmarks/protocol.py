@@ -26,6 +26,7 @@ class Trial:
     candidates: int
     executor: Executor = "picker"
     engine: Engine = "xpbd"
+    softness: float = 1.0
 
     @property
     def key(self) -> str:
@@ -40,9 +41,10 @@ class Trial:
 
     @property
     def unusual(self) -> list[str]:
-        """Who picks when that is not the flying gripper, what moves the cloth when that is not our solver."""
-        usual = {"picker", "xpbd"}
-        return [choice for choice in (self.executor, self.engine) if choice not in usual]
+        """Who picks when not the flying gripper, what moves the cloth when not our solver, how soft it is when not as
+        usual."""
+        usual = {"picker", "xpbd", "softness 1"}
+        return [it for it in (self.executor, self.engine, f"softness {self.softness:.3g}") if it not in usual]
 
     def request(self) -> EpisodeRequest:
         """Garment and crumple depend on the state alone, so that all methods and tasks meet the same states."""
@@ -73,6 +75,7 @@ def trials(
     candidates: int,
     executors: tuple[Executor, ...] = ("picker",),
     engine: Engine = "xpbd",
+    softness: float = 1.0,
 ) -> Iterator[Trial]:
     """State by state, so that an unfinished run has every method on the same first states."""
     for state in range(states):
@@ -80,4 +83,4 @@ def trials(
             for task in tasks:
                 for method in methods:
                     for executor in executors:
-                        yield Trial(method, category, task, state, start, picks, candidates, executor, engine)
+                        yield Trial(method, category, task, state, start, picks, candidates, executor, engine, softness)

@@ -44,19 +44,21 @@ class Options:
     """Who picks: the paper's flying gripper, the Panda arm, or both on the same states."""
     engine: Engine = "xpbd"
     """What moves the cloth in the cell that is started: our solver, or PyBullet's soft body (slow)."""
+    softness: float = 1.0
+    """How many times as easily as usual the cloth bends, on the table and in the planner's physics alike."""
     out: Path = Path("runs/bench")
     router: str = ""
     """Zenoh endpoint of a running cell; empty starts one."""
 
 
 @contextmanager
-def cell_bus(router: str, engine: Engine, logs: Path) -> Iterator[Bus]:
+def cell_bus(router: str, environment: dict[str, str], logs: Path) -> Iterator[Bus]:
     """A bus member in a simulated cell, started for the purpose (with its `logs`) when no router is given."""
     if router:
         with join("benchmark", BusConfig(router=router)) as bus:
             yield bus
         return
-    with Launcher("sim", environment={"MEDOR_SIM__ENGINE": engine}, echo=False, logs=logs) as cell:
+    with Launcher("sim", environment=environment, echo=False, logs=logs) as cell:
         cell.wait_ready()
         yield cell.bus
 
@@ -114,6 +116,7 @@ def main(options: Options) -> int:
             options.candidates,
             options.executor,
             options.engine,
+            options.softness,
         )
     )
     missing = [trial for trial in every if trial.key not in results.finished()]
@@ -131,7 +134,9 @@ def main(options: Options) -> int:
 def run_missing(missing: list[Trial], results: Results, options: Options, console: Console) -> int:
     """Run trials one after the other; how many failed."""
     failed, began = 0, time.monotonic()
-    with cell_bus(options.router, options.engine, (options.out / "logs").absolute()) as bus:
+    cell = {"MEDOR_SIM__ENGINE": options.engine}
+    cell |= dict.fromkeys(("MEDOR_SIM__SOFTNESS", "MEDOR_DYNAMICS__SOFTNESS"), str(options.softness))
+    with cell_bus(options.router, cell, (options.out / "logs").absolute()) as bus:
         for done, trial in enumerate(missing):
             try:
                 results.append(run_trial(bus, trial, console))

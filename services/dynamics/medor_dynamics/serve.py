@@ -40,12 +40,8 @@ class Config(Settings, section="dynamics"):
 def main(config: Config) -> None:
     threads = config.threads or -(-(os.cpu_count() or 1) // config.replicas)
     torch.set_num_threads(1)
-    roller = Roller(
-        {
-            "physics": Physics(threads, config=SolverConfig().softer(config.softness)),
-            "learned": learned(config.weights, threads, PRECISIONS[config.precision]),
-        }
-    )
+    physics = Physics(threads, config=SolverConfig().softer(config.softness))
+    roller = Roller({"physics": physics, "learned": learned(config.weights, threads, PRECISIONS[config.precision])})
     with join("dynamics", config.bus) as bus:
         bus.ready(False, "compiling")
         bus.serve(endpoints.ROLLOUT, roller.roll_out)

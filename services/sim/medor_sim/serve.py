@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from medor_cloth.camera import overhead
+from medor_cloth.solver import SolverConfig
 from medor_sim.grasp_failures import GraspFailures
 from medor_sim.scene import Scene
 from medor_sim.simulator import Simulator
@@ -24,6 +25,8 @@ from medor_wire.motion import Motion
 class Config(Settings, section="sim"):
     engine: Literal["xpbd", "bullet"] = "xpbd"
     """What moves the cloth: our solver, or PyBullet's soft body (slow; see the README)."""
+    softness: float = Field(default=1.0, gt=0)
+    """How many times as easily as usual the cloth bends; `xpbd` only."""
     ledger: Path = Path("runs/sim/ledger.sqlite")
     """Where actions are written down before they are carried out."""
     miss: float = Field(default=0.0, ge=0, le=1)
@@ -58,7 +61,8 @@ def main(config: Config) -> None:
     failures = GraspFailures(config.miss, config.two_layers, config.failure_seed)
     with join("sim", config.bus) as bus:
         bus.ready(False, "warming up")
-        with closing(Simulator(motion, Wardrobe(config.garments, config.engine), bus.publish, failures)) as simulator:
+        wardrobe = Wardrobe(config.garments, config.engine, SolverConfig().softer(config.softness))
+        with closing(Simulator(motion, wardrobe, bus.publish, failures)) as simulator:
             serve(bus, simulator, motion)
             warm_up()
             bus.ready()

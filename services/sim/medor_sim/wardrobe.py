@@ -14,7 +14,7 @@ from medor_cloth.errors import ClothError
 from medor_cloth.garment import Garment, generate
 from medor_cloth.goals import flattened, goal_set, solver_of
 from medor_cloth.mesh_io import load_mesh
-from medor_cloth.solver import ClothState
+from medor_cloth.solver import ClothState, SolverConfig
 from medor_sim.bullet_cloth import EDGE_M as BULLET_EDGE_M
 from medor_sim.bullet_cloth import BulletCloth
 from medor_sim.soft_body import MARGIN_M
@@ -35,11 +35,18 @@ class Piece:
     Flat state and goals come from our solver whatever the engine, on the same mesh, so that figures mean the same.
     """
 
-    def __init__(self, id: str, category: Category, garment: Garment, engine: EngineName = "xpbd") -> None:
+    def __init__(
+        self,
+        id: str,
+        category: Category,
+        garment: Garment,
+        engine: EngineName = "xpbd",
+        config: SolverConfig | None = None,
+    ) -> None:
         self.id = id
         self.category: Category = category
         self.garment = garment
-        self.solver = solver_of(garment)
+        self.solver = solver_of(garment, config)
         self.engine: Engine = self.solver if engine == "xpbd" else BulletCloth(garment, self.solver.cloth)
         self.max_start_coverage = MAX_START_COVERAGE[engine]
         self._thickness = 1.0 if engine == "xpbd" else 2 * MARGIN_M / self.solver.config.thickness
@@ -67,8 +74,9 @@ class Piece:
 class Wardrobe:
     """Generated and uploaded garments, the latest `capacity` of each kind; older ones are forgotten."""
 
-    def __init__(self, capacity: int = 8, engine: EngineName = "xpbd") -> None:
+    def __init__(self, capacity: int = 8, engine: EngineName = "xpbd", config: SolverConfig | None = None) -> None:
         self._capacity = capacity
+        self._config = config
         self._engine: EngineName = engine
         self._generated: OrderedDict[str, Piece] = OrderedDict()
         self._uploaded: OrderedDict[str, Piece] = OrderedDict()
@@ -85,7 +93,7 @@ class Wardrobe:
             if id not in self._generated:
                 try:
                     garment = generate(category, seed, EDGE_M[self._engine])
-                    self._keep(self._generated, Piece(id, category, garment, self._engine))
+                    self._keep(self._generated, Piece(id, category, garment, self._engine, self._config))
                 except ClothError as error:
                     raise BadRequest(f"garment_seed: {error}") from error
             self._generated.move_to_end(id)
@@ -111,7 +119,7 @@ class Wardrobe:
         """
         id = f"{category}-{hashlib.sha256(category.encode() + content).hexdigest()[:12]}"
         try:
-            piece = Piece(id, category, load_mesh(content, category, file_type), self._engine)
+            piece = Piece(id, category, load_mesh(content, category, file_type), self._engine, self._config)
         except ClothError as error:
             raise BadRequest(f"content: {error}") from error
         with self._lock:

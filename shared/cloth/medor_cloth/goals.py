@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from medor_cloth.cloth import Cloth
 from medor_cloth.garment import SYMMETRY_ORDER, Garment
-from medor_cloth.solver import ClothState, Solver
+from medor_cloth.solver import ClothState, Solver, SolverConfig
 
 PRESS_FRAMES = 150
 """Frames under the press: gravity many times over."""
@@ -17,9 +17,9 @@ SETTLED_SPEED = 0.02
 """Speed below which a flat cloth counts as settled [m/s]."""
 
 
-def solver_of(garment: Garment) -> Solver:
-    """A solver with the constants we trust for a garment."""
-    return Solver(Cloth.from_mesh(garment.vertices, garment.faces, garment.panel_uv))
+def solver_of(garment: Garment, config: SolverConfig | None = None) -> Solver:
+    """A solver for a garment, with the constants we trust unless others are given."""
+    return Solver(Cloth.from_mesh(garment.vertices, garment.faces, garment.panel_uv), config)
 
 
 def goal_set(garment: Garment, solver: Solver | None = None) -> NDArray[np.float32]:
