@@ -7,6 +7,8 @@ import pytest
 
 from medor_learn.errors import WeightsError
 from medor_recon.completion.augment import Augmentation
+from medor_recon.completion.field import FieldConfig
+from medor_recon.completion.field_completion import FieldCompletion
 from medor_recon.completion.fill import FillConfig
 from medor_recon.completion.observations import observations
 from medor_recon.completion.predictions import Predictions
@@ -34,6 +36,20 @@ def test_the_command_learns_and_its_folder_completes_a_view(small, data, seen, t
     assert isinstance(trained, TemplateCompletion)
     assert trained.templates["tshirt"].seeds.tolist() == [4]
     np.testing.assert_allclose(trained.complete(seen).positions[:, 2], 0.005, atol=0.03)
+
+
+@pytest.mark.parametrize("steps", [1, 40])
+def test_a_field_is_taught_by_the_same_command_and_gets_its_threshold(data, tmp_path, capsys, monkeypatch, steps):
+    """One that has learnt nothing, too: its run ends in order, its views are refused."""
+    network = FieldConfig(0, (16, 8), 8, 8, 2, 8, (32,), False, True, True, 100.0, 16)
+    monkeypatch.setitem(PRESETS, "paper-small", Preset(network, 0.01, Augmentation(), 1, 1e-2, 300))
+    completion(("tshirt",), (data,), tmp_path, "paper-small", steps=steps, validated=2, bf16=False)
+    said = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert 0 <= said["meshes"]["true"]["failed"] <= 1
+    trained = load(tmp_path / "best")
+    assert isinstance(trained, FieldCompletion)
+    assert 0 < trained.thresholds["tshirt"] < 1
+    assert trained.spacing == 0.01
 
 
 def test_predictions_are_kept_and_know_their_turn(data, tmp_path):

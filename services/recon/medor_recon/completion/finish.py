@@ -10,7 +10,7 @@ from medor_recon.canonicalized import Canonicalized
 from medor_recon.completion.augment import Example, example
 from medor_recon.completion.completion import Completion
 from medor_recon.completion.field import Field
-from medor_recon.completion.field_completion import winding_grid
+from medor_recon.completion.field_completion import DEFAULT_THRESHOLD, winding_grid
 from medor_recon.completion.material import Material
 from medor_recon.completion.measures import mean_of, mesh_errors
 from medor_recon.completion.observations import CAMERA, Observation, truth
@@ -36,17 +36,21 @@ def choose_templates(learn: list[Observation], category: str, number: int) -> Te
 def choose_threshold(field: Field, examples: list[Example], rng: np.random.Generator) -> float:
     """The gradient of the field that tells cloth from openings best, over some views of one category.
 
-    Raises:
-        ReconstructionFailed: none of the fields has a surface.
+    Views whose field has no surface say nothing; without any other the published threshold stays.
     """
     steepness, true = [], []
     for item in examples:
         with torch.inference_mode():
             winding = winding_grid(field, field.volume([field.frame(item.pixels).view(item.pixels)]))
-        vertices, _, steep = closed_surface(winding)
+        try:
+            vertices, _, steep = closed_surface(winding)
+        except ReconstructionFailed:
+            continue
         cloth, _ = on_surface(item, rng, CLOTH_SAMPLES, push=0.0)
         true.append(on_cloth(vertices, cloth, ON_CLOTH_M / NOCS[item.pixels.category].side))
         steepness.append(steep)
+    if not steepness:
+        return DEFAULT_THRESHOLD
     return best_threshold(np.concatenate(steepness), np.concatenate(true))
 
 
