@@ -1,7 +1,7 @@
 """Run a whole cell without containers: host the router, start what compose.yaml says, keep it running, stop it.
 
 with Launcher(profile="sim") as cell:
-    cell.wait_ready(timeout=60)
+    cell.wait_ready(timeout=300)
     httpx.get(f"{cell.url}/readyz")
 """
 
@@ -170,7 +170,7 @@ class Launcher:
         except (OSError, http.client.HTTPException):
             return False
 
-    def wait_ready(self, timeout: float = 60.0) -> float:
+    def wait_ready(self, timeout: float = 300.0) -> float:
         """Blocks until every process says it is ready, showing progress. Returns the seconds waited.
 
         Raises:
