@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +18,9 @@ TINY = replace(CPU, width=32, blocks=3)
 CARD = {"preset": {**vars(TINY)}}
 
 
-def task_of(folded: Recording, **options) -> Foresight:
+def task_of(folded: Recording, size: int = 4, **options: Any) -> Foresight:
     torch.manual_seed(0)
-    return Foresight(Dynamics(TINY), Sampler([folded], **{"size": 4} | options), [folded])
+    return Foresight(Dynamics(TINY), Sampler([folded], size=size, **options), [folded])
 
 
 def test_one_recording_is_learnt(folded, tmp_path):
@@ -27,8 +28,9 @@ def test_one_recording_is_learnt(folded, tmp_path):
     task = task_of(folded, size=8)
     summary = train(task, tmp_path, Schedule(steps=120, lr=3e-3, warm_up=20, validate_every=60), card=CARD)
     going_on = task_of(folded, size=8)
-    torch.nn.init.zeros_(going_on.module.network.decode[4].weight)
-    torch.nn.init.zeros_(going_on.module.network.decode[4].bias)
+    assert isinstance(going_on.module, Dynamics)
+    for parameter in going_on.module.network.decode[4].parameters():
+        torch.nn.init.zeros_(parameter)
     with torch.no_grad():
         learnt, naive = (np.mean([float(each.loss(step)) for step in range(10)]) for each in (task, going_on))
     assert learnt < 0.6 * naive
@@ -50,6 +52,7 @@ def test_the_unrolled_loss_of_one_step_is_the_squared_error_of_the_acceleration(
     task = task_of(folded)
     batch = Sampler([folded], size=4).draw(5)
     model = task.module
+    assert isinstance(model, Dynamics)
     after = model(batch.graphs, batch.motion, batch.grips[0])
     accelerations = [
         (to - batch.motion.positions) / 0.05 - batch.motion.velocities[:, 0]

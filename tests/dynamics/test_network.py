@@ -6,7 +6,7 @@ import torch
 
 from medor_dynamics.graphs import Graphs
 from medor_dynamics.lean import LeanNetwork
-from medor_dynamics.network import EDGE_FEATURES, NODE_FEATURES, GraphNetwork
+from medor_dynamics.network import EDGE_FEATURES, NODE_FEATURES, Block, GraphNetwork
 from medor_dynamics.plain import pass_messages
 from medor_dynamics.preset import CPU, PAPER
 
@@ -39,6 +39,7 @@ def test_the_papers_network_has_its_size():
 def test_the_split_first_layer_is_the_layer_over_everything_at_once(preset, wiring):
     torch.manual_seed(0)
     block = GraphNetwork(preset).blocks[0]
+    assert isinstance(block, Block)
     nodes, edges = torch.randn(120, preset.width), torch.randn(len(wiring.senders), preset.width)
     first = wiring.receivers < 60
     alone = pass_messages(

@@ -1,5 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from medor_dynamics.preset import CPU, PAPER, PULL_STEPS, STEP_S, STEPS
 from medor_dynamics.samples import Recording, Sampler, recordings, seen, stretches
 
 
-def drawn(recording: Recording, **options):
-    return Sampler([recording], **{"size": 4, "seed": 3} | options).draw(0)
+def drawn(recording: Recording, size: int = 4, seed: int = 3, **options: Any):
+    return Sampler([recording], size=size, seed=seed, **options).draw(0)
 
 
 def test_a_batch_depends_on_seed_and_step_alone(folded):
