@@ -51,7 +51,7 @@ def test_empty_arrays_and_empty_bytes_travel() -> None:
     empty = UploadGarment(content=b"", file_type="obj", category="dress")
     assert decode(UploadGarment, encode(empty)) == empty
     reach = examples.EXCHANGES[next(e for e in ENDPOINTS if e.verb == "reach")].request.model_copy(
-        update={"points": np.zeros((0, 3), np.float32)}
+        update={"points": np.zeros((0, 3), np.float32), "places": np.zeros((0, 3), np.float32)}
     )
     assert decode(type(reach), encode(reach)) == reach
 
