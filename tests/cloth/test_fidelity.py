@@ -17,14 +17,17 @@ from tests.cloth.sheets import sheet, solver_of
 pytestmark = pytest.mark.slow
 
 GARMENTS = [(category, seed) for category, seeds in SEEDS.items() for seed in seeds]
+NARROW = ("trousers", 800124)
+OPENS = pytest.mark.xfail(strict=True, reason="a leg narrower than its fold stands up and rolls open again")
+FOLDABLE = [pytest.param(*garment, marks=OPENS if garment == NARROW else ()) for garment in GARMENTS]
 laid_flat = cache(Flat)
 
 
-def test_corner_folds_stay_and_their_inverse_restores():
-    """All but one: a leg narrower than its fold stands up and rolls open again."""
-    folds = [fidelity.corner_fold(laid_flat(category, seed)) for category, seed in GARMENTS]
-    assert sum(fold.kept > 0.7 for fold in folds) >= len(GARMENTS) - 1
-    assert min(fold.restored for fold in folds) > 0.95
+@pytest.mark.parametrize(("category", "seed"), FOLDABLE)
+def test_a_corner_fold_stays_and_its_inverse_restores(category: str, seed: int):
+    fold = fidelity.corner_fold(laid_flat(category, seed))
+    assert fold.kept > 0.7
+    assert fold.restored > 0.97
 
 
 def test_garments_in_half_stay_and_open_again():
@@ -33,11 +36,9 @@ def test_garments_in_half_stay_and_open_again():
     assert np.median([fold.restored for fold in folds]) > 0.9
 
 
-@pytest.mark.parametrize(("category", "seed"), GARMENTS)
+@pytest.mark.parametrize(("category", "seed"), FOLDABLE)
 def test_a_corner_pull_unfolds_with_friction_and_drags_without(category: str, seed: int):
     flat = laid_flat(category, seed)
-    if fidelity.fold_corner(flat)[2] < 0.5:
-        pytest.skip("the fold opened by itself")
     rough, slippery = fidelity.corner_pull(flat), fidelity.corner_pull(flat, friction=False)
     assert rough.unfolded > 0.5
     assert rough.dragged_m < 0.25 * slippery.dragged_m

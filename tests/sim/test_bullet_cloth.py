@@ -190,6 +190,7 @@ def test_uploaded_meshes_are_its_cloth_too_unless_too_fine():
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="PyBullet's skirt rests at a strain of 18 %, a T-shirt at 5 %")
 def test_a_dropped_garment_is_picked_and_stays_cloth():
     piece = Wardrobe(engine="bullet").generated("skirt", 800001)
     scene = Scene.begin(piece, "drop", 0)
@@ -200,9 +201,7 @@ def test_a_dropped_garment_is_picked_and_stays_cloth():
     for positions in (scene.cloth.positions, pulled.scene.cloth.positions):
         assert np.isfinite(positions).all()
         assert positions[:, 2].min() > -MARGIN_M
-        assert (
-            np.percentile(np.abs(strain(piece.engine, positions)), 95) < 0.25
-        )  # PyBullet: 0.18 for this skirt, 0.05 for a T-shirt
+        assert np.percentile(np.abs(strain(piece.engine, positions)), 95) < 0.12
     assert np.abs(pulled.scene.cloth.positions - scene.cloth.positions).max() > 0.04
 
 
