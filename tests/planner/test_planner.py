@@ -58,7 +58,7 @@ def test_same_seed_same_plan_other_seed_another(lab):
 def test_on_a_flat_garment_there_is_nothing_to_gain(lab):
     lab.cell.lay(lab.cell.flat)
     plan = lab.bus.ask(endpoints.PLAN, ORACLE.model_copy(update={"candidates": 6}))
-    assert plan.reward == pytest.approx(plan.no_op_reward, rel=0.01), "nothing to gain"
+    assert plan.reward == pytest.approx(plan.no_op_reward, rel=1e-3), "nothing to gain"
     assert plan.no_op == (plan.reward == plan.no_op_reward) == np.array_equal(plan.pick, plan.place)
     assert plan.top_rewards.max() <= plan.reward
 
