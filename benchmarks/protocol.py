@@ -1,8 +1,9 @@
 """Which episodes a benchmark runs: methods x categories x tasks x held-out states, each with fixed seeds."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, Self, get_args
 
 from medor_wire.messages import Category, EpisodeRequest, Executor, ResetRequest, StartState, Task
 
@@ -11,6 +12,11 @@ HELD_OUT_SEED = 800_000
 
 Engine = Literal["xpbd", "bullet"]
 """What moves the cloth in the simulated cell (`MEDOR_SIM__ENGINE`)."""
+
+KEY = re.compile(
+    r"(?P<method>[^/]+)/(?P<category>[a-z]+)/(?P<task>[a-z]+)/(?P<start>[a-z]+)(?P<state>\d+)"
+    r"/p(?P<picks>\d+)/k(?P<candidates>\d+)(?P<unusual>(/[^/]+)*)"
+)
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,23 @@ class Trial:
         """Names the trial in the results file; the same key is never run twice into one file."""
         key = f"{self.method}/{self.category}/{self.task}/{self.start}{self.state}/p{self.picks}/k{self.candidates}"
         return "/".join([key, *self.unusual])
+
+    @classmethod
+    def of(cls, key: str) -> Self:
+        """The trial that a key names.
+
+        Raises:
+            ValueError: not a key of a trial.
+        """
+        match = KEY.fullmatch(key)
+        if match is None:
+            raise ValueError(f"expected method/category/task/start and state/p picks/k candidates, got {key!r}")
+        fields: dict[str, Any] = match.groupdict()
+        for name in ("state", "picks", "candidates"):
+            fields[name] = int(fields[name])
+        for word in filter(None, fields.pop("unusual").split("/")):
+            fields |= _unusual(word)
+        return cls(**fields)
 
     @property
     def label(self) -> str:
@@ -63,6 +86,18 @@ class Trial:
                 seed=self.state,
             ),
         )
+
+
+def _unusual(word: str) -> dict[str, Any]:
+    """The field that a word of `Trial.unusual` sets."""
+    if word in get_args(Executor):
+        return {"executor": word}
+    if word in get_args(Engine):
+        return {"engine": word}
+    name, _, value = word.partition(" ")
+    if name != "softness":
+        raise ValueError(f"expected an executor, an engine or a softness, got {word!r}")
+    return {"softness": float(value)}
 
 
 def trials(

@@ -41,6 +41,19 @@ class Results:
             file.flush()
 
 
+@dataclass(frozen=True)
+class Missing:
+    """Why episodes that were asked for are not among the results: one JSON object in `path`, by key."""
+
+    path: Path
+
+    def keep(self, reasons: dict[str, str]) -> None:
+        self.path.write_text(json.dumps(reasons, indent=1) + "\n")
+
+    def reasons(self) -> dict[str, str]:
+        return json.loads(self.path.read_text()) if self.path.exists() else {}
+
+
 def _parse(text: str) -> Line | None:
     try:
         return json.loads(text)

@@ -1,12 +1,12 @@
 """Closed-loop evaluation over the bus: `python -m benchmarks.run --methods oracle visible random --states 2`.
 
 Starts a simulated cell of its own (or uses a running one with `--router`), runs every trial of the protocol that
-the results file does not hold yet, appends one JSON line per pick, and prints the table. Kill it and start it again:
-it goes on where it stopped.
+the results file does not hold yet and appends one JSON line per pick. Kill it and start it again: it goes on where it
+stopped. Methods without weights are skipped. Then everything in the folder is written up as `table.json`, `table.md`
+and `report.html`; with `--report-only` that is all it does.
 """
 
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,15 +15,18 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
+from benchmarks.closed_loop import ClosedLoop
+from benchmarks.findings import Findings
 from benchmarks.protocol import Engine, Trial, trials
-from benchmarks.results import Line, Results
-from benchmarks.table import markdown
-from medor_wire import endpoints
+from benchmarks.provenance import provenance
+from benchmarks.published import METHODS
+from benchmarks.report import page
+from benchmarks.results import Missing, Results
+from benchmarks.skips import Skips
 from medor_wire.bus import Bus, join
 from medor_wire.config import BusConfig
-from medor_wire.errors import MedorError
 from medor_wire.launcher import Launcher, heed_signals
-from medor_wire.messages import Category, EpisodePick, EpisodeProgress, Executor, Message, StartState, Task
+from medor_wire.messages import Category, Executor, StartState, Task
 
 ALL: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
 
@@ -32,7 +35,7 @@ ALL: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
 class Options:
     """What to evaluate."""
 
-    methods: tuple[str, ...] = ("oracle", "visible", "random")
+    methods: tuple[str, ...] = METHODS
     categories: tuple[Category, ...] = ALL
     tasks: tuple[Task, ...] = ("flatten", "canonicalize")
     states: int = 3
@@ -49,6 +52,15 @@ class Options:
     out: Path = Path("runs/bench")
     router: str = ""
     """Zenoh endpoint of a running cell; empty starts one."""
+    report_only: bool = False
+    """Run nothing: write up what the folders hold."""
+    also: tuple[Path, ...] = ()
+    """Other results folders to write up with this one. Where both hold an episode, this one's counts."""
+
+    def trials(self) -> list[Trial]:
+        """Everything asked for."""
+        what = self.methods, self.categories, self.tasks, self.states, self.start, self.picks, self.candidates
+        return list(trials(*what, self.executor, self.engine, self.softness))
 
 
 @contextmanager
@@ -63,89 +75,42 @@ def cell_bus(router: str, environment: dict[str, str], logs: Path) -> Iterator[B
         yield cell.bus
 
 
-def run_trial(bus: Bus, trial: Trial, console: Console) -> list[Line]:
-    """The lines of one episode, start state included.
-
-    Raises:
-        MedorError: the cell refused or was lost.
-    """
-    steps: list[tuple[EpisodePick, float]] = []
-    began = time.perf_counter()
-
-    def report(message: Message) -> None:
-        if isinstance(message, EpisodeProgress) and message.step is not None:
-            steps.append((message.step, time.perf_counter()))
-            console.print(f"  {trial.key}  pick {message.step.index}  NI {message.step.ni:.3f}", highlight=False)
-
-    bus.ask(endpoints.EPISODE, trial.request(), on_progress=report)
-    lines = []
-    for step, ended in steps:
-        lines.append(
-            {
-                "key": trial.key,
-                "method": trial.label,
-                "category": trial.category,
-                "task": trial.task,
-                "state": trial.state,
-                "pick": step.index,
-                "ni": step.ni,
-                "coverage_m2": step.coverage_m2,
-                "no_op": step.no_op,
-                "seconds": ended - began,
-                "timings_ms": step.timings_ms,
-                "last": step is steps[-1][0],
-            }
-        )
-        began = ended
-    return lines
-
-
 def main(options: Options) -> int:
-    """Run what is missing; 0 when every trial is in the file."""
+    """Run what is missing and write it up; 0 when all of it is in the file, but for skipped methods."""
     console = Console(stderr=True)
-    results = Results(options.out / "picks.jsonl")
-    results.keep_finished()
-    every = list(
-        trials(
-            options.methods,
-            options.categories,
-            options.tasks,
-            options.states,
-            options.start,
-            options.picks,
-            options.candidates,
-            options.executor,
-            options.engine,
-            options.softness,
-        )
-    )
-    missing = [trial for trial in every if trial.key not in results.finished()]
-    console.print(f"{len(every) - len(missing)} of {len(every)} episodes in {results.path}")
-    failed = run_missing(missing, results, options, console) if missing else 0
-    keys = {trial.key for trial in every}
-    lines = [line for line in results.lines() if line["key"] in keys]
-    if lines:
-        table = markdown(lines, options.picks)
-        (options.out / "table.md").write_text(table + "\n")
-        print(table)
+    failed = 0 if options.report_only else run(options, console)
+    write_up(options, console)
     return 1 if failed else 0
 
 
-def run_missing(missing: list[Trial], results: Results, options: Options, console: Console) -> int:
-    """Run trials one after the other; how many failed."""
-    failed, began = 0, time.monotonic()
+def run(options: Options, console: Console) -> int:
+    """Runs the trials that the results file lacks; how many failed."""
+    results, every = Results(options.out / "picks.jsonl"), options.trials()
+    results.keep_finished()
+    finished = results.finished()
+    missing = [trial for trial in every if trial.key not in finished]
+    console.print(f"{len(every) - len(missing)} of {len(every)} episodes in {results.path}", highlight=False)
+    if not missing:
+        return 0
+    skips = Skips(finished)
     cell = {"MEDOR_SIM__ENGINE": options.engine}
     cell |= dict.fromkeys(("MEDOR_SIM__SOFTNESS", "MEDOR_DYNAMICS__SOFTNESS"), str(options.softness))
     with cell_bus(options.router, cell, (options.out / "logs").absolute()) as bus:
-        for done, trial in enumerate(missing):
-            try:
-                results.append(run_trial(bus, trial, console))
-            except MedorError as error:
-                failed += 1
-                console.print(f"[red]{trial.key}: {error.code}: {error}[/red]")
-            left = (time.monotonic() - began) / (done + 1) * (len(missing) - done - 1)
-            console.print(f"{done + 1}/{len(missing)} episodes, about {left / 60:.0f} min left")
-    return failed
+        loop = ClosedLoop(bus, options.out, lambda line: console.print(line, highlight=False, markup=False))
+        reasons = loop.run(missing, results, skips)
+    Missing(options.out / "missing.json").keep(reasons)
+    return sum(trial.key in reasons and skips.reason(trial) is None for trial in missing)
+
+
+def write_up(options: Options, console: Console) -> None:
+    """Writes the tables and the report of the folders, and prints the tables."""
+    findings = Findings.of((options.out, *options.also), options.picks, options.start, provenance())
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / "table.json").write_text(findings.as_json())
+    (options.out / "table.md").write_text(findings.as_markdown())
+    (options.out / "report.html").write_text(page(findings))
+    print(findings.as_markdown())
+    console.print(f"report: {options.out / 'report.html'}", highlight=False)
 
 
 if __name__ == "__main__":

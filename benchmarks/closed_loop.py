@@ -1,0 +1,119 @@
+"""Episodes of the protocol in a cell, one after the other, each kept as soon as it has ended."""
+
+import time
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from benchmarks import pictures
+from benchmarks.pace import Pace
+from benchmarks.protocol import Trial
+from benchmarks.results import Line, Results
+from benchmarks.skips import Skips, told
+from medor_learn.revision import revision
+from medor_wire import endpoints
+from medor_wire.bus import Bus
+from medor_wire.errors import MedorError, NoGarment, OutOfReach, ReconstructionFailed, SeveralGarments
+from medor_wire.messages import Empty, EpisodePick, EpisodeProgress, Message
+
+GIVEN_UP = (NoGarment, OutOfReach, ReconstructionFailed, SeveralGarments)
+"""What a method answers when it cannot go on. The episode counts with the NI it has reached."""
+
+
+class ClosedLoop:
+    """Runs trials in the cell of a bus.
+
+    Args:
+        folder: where results are kept, and pictures.
+        tell: told where the run stands, a line at a time.
+    """
+
+    def __init__(self, bus: Bus, folder: Path, tell: Callable[[str], None]) -> None:
+        self._bus, self._folder, self._tell = bus, folder, tell
+        self._commit = revision()
+
+    def run(self, missing: Sequence[Trial], results: Results, skips: Skips) -> dict[str, str]:
+        """Runs trials one after the other; why those that are not in the file now are not, by key."""
+        pace, reasons = Pace(results.lines()), {}
+        for done, trial in enumerate(missing):
+            if reason := skips.reason(trial):
+                reasons[trial.key] = reason
+                continue
+            left = pace.left(one for one in missing[done:] if skips.reason(one) is None)
+            began = time.monotonic()
+            try:
+                results.append(self.episode(trial, f"[{done + 1}/{len(missing)}, {_minutes(left)}]"))
+            except MedorError as error:
+                reasons[trial.key] = told(error)
+                skips.refused(trial, error)
+                self._tell(f"{trial.key}  {told(error)}")
+            else:
+                skips.works(trial)
+                pace.add(trial, time.monotonic() - began)
+        return reasons
+
+    def episode(self, trial: Trial, standing: str) -> list[Line]:
+        """The lines of one episode, start state included; its picture is kept.
+
+        Args:
+            trial: which.
+            standing: told with every pick: where the run stands.
+
+        Raises:
+            MedorError: the cell refused or was lost.
+        """
+        steps: list[EpisodePick] = []
+        clock = [time.perf_counter()]
+
+        def report(message: Message) -> None:
+            if isinstance(message, EpisodeProgress) and message.step is not None:
+                steps.append(message.step)
+                clock.append(time.perf_counter())
+                self._tell(f"{standing} {trial.key}  pick {message.step.index}  NI {message.step.ni:.3f}")
+
+        gave_up: dict[str, Any] = {}
+        try:
+            self._bus.ask(endpoints.EPISODE, trial.request(), on_progress=report)
+        except GIVEN_UP as error:
+            if not steps:
+                raise
+            gave_up = {"gave_up": error.code}
+            self._tell(f"{standing} {trial.key}  gives up: {told(error)}")
+        self._picture(trial, steps)
+        seconds = [after - before for before, after in pairwise(clock)]
+        lines = [self._line(trial, *one) for one in zip(steps, seconds, strict=True)]
+        lines[-1] |= {"last": True, **gave_up}
+        return lines
+
+    def _line(self, trial: Trial, step: EpisodePick, seconds: float) -> Line:
+        return {
+            "key": trial.key,
+            "method": trial.label,
+            "category": trial.category,
+            "task": trial.task,
+            "state": trial.state,
+            "pick": step.index,
+            "ni": step.ni,
+            "coverage_m2": step.coverage_m2,
+            "no_op": step.no_op,
+            "seconds": seconds,
+            "timings_ms": step.timings_ms,
+            "commit": self._commit,
+            "last": False,
+        }
+
+    def _picture(self, trial: Trial, steps: Sequence[EpisodePick]) -> None:
+        """What the camera saw before each pick, and what it sees now. An episode counts without it."""
+        try:
+            now = self._bus.ask(endpoints.CAPTURE, Empty())
+        except MedorError as error:
+            self._tell(f"no picture of {trial.key}: {told(error)}")
+            return
+        path = pictures.path(self._folder, trial.key)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(pictures.strip([*(step.view for step in steps if step.view is not None), now]))
+
+
+def _minutes(seconds: float | None) -> str:
+    return "no telling how long" if seconds is None else f"{seconds / 60:.0f} min left"
