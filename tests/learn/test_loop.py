@@ -177,3 +177,25 @@ def test_hours_of_cpu_time_end_a_run_and_are_counted_over_resumptions(tmp_path):
     assert summary["hours"] >= 0.1 / 3600
     again = train(Waves(), tmp_path, long, card=CARD)
     assert again["step"] == summary["step"]
+
+
+def test_a_run_begins_with_the_weights_of_another_and_says_so(tmp_path):
+    train(Waves(), tmp_path / "first", SCHEDULE, card=CARD)
+    taught, _ = weights.load(tmp_path / "first" / "best", lambda config: Waves().module)
+    second, still = Waves(), replace(SCHEDULE, steps=1, lr=0.0)
+    train(second, tmp_path / "second", still, card=CARD, start=tmp_path / "first" / "best")
+    learnt = zip(second.module.named_parameters(), taught.parameters(), strict=True)
+    assert all(torch.equal(ours, theirs) for (_, ours), theirs in learnt)
+    config = weights.read_config(tmp_path / "second" / "best")
+    assert config["start"]["data"] == CARD["data"]
+    assert config["start"]["metrics"]["step"] == weights.read_config(tmp_path / "first" / "best")["metrics"]["step"]
+
+
+def test_a_resumed_run_goes_on_from_its_checkpoint_not_from_its_start(tmp_path):
+    train(Waves(), tmp_path / "first", replace(SCHEDULE, steps=8), card=CARD)
+    start = tmp_path / "first" / "best"
+    whole, parts = Waves(), Waves()
+    train(whole, tmp_path / "whole", SCHEDULE, card=CARD, start=start)
+    train(Waves(), tmp_path / "parts", SCHEDULE, card=CARD, start=start, on_step=interrupt_at(11))
+    train(parts, tmp_path / "parts", SCHEDULE, card=CARD, start=start)
+    assert same(parts.module, whole.module)

@@ -29,7 +29,7 @@ class Options:
     test: Path
     """Data set of held-out garments."""
     out: Path
-    preset: Literal["cpu", "paper"] = "cpu"
+    preset: Literal["cpu", "paper", "screen"] = "cpu"
     hours: float | None = None
     """CPU hours, over all resumptions."""
     steps: int = 1_000_000
@@ -94,7 +94,8 @@ def main(options: Options) -> None:
         seed=options.seed,
         threads=options.threads,
     )
-    train(task, options.out, schedule, card=card(options, preset, training), tensorboard=options.tensorboard)
+    facts = card(options, preset, training)
+    train(task, options.out, schedule, card=facts, start=options.start, tensorboard=options.tensorboard)
 
 
 def preset_of(options: Options) -> Preset:

@@ -9,6 +9,7 @@ from typing import Any
 
 import torch
 
+from medor_learn import weights
 from medor_learn.interrupt import asked_to_stop
 from medor_learn.progress import TrainingProgress
 from medor_learn.run import Run, Task
@@ -25,6 +26,7 @@ def train(
     schedule: Schedule,
     *,
     card: dict[str, Any],
+    start: Path | None = None,
     tensorboard: bool = False,
     on_step: Callable[[int, float], None] | None = None,
 ) -> dict[str, Any]:
@@ -36,6 +38,7 @@ def train(
         schedule: how long and how fast.
         card: JSON that describes the network and its data, all that is needed to build it; becomes the weights' config
             together with step, metrics, schedule and revision. Must be the same when a run goes on.
+        start: folder of weights to begin with, of an earlier run on other data for instance; the card then says so.
         tensorboard: write the metrics for TensorBoard, too.
         on_step: called with the number of steps done and the loss of the last.
 
@@ -44,8 +47,11 @@ def train(
 
     Raises:
         ResumeError: the folder holds a run of another card or schedule.
+        WeightsError: `start` holds weights of another network.
         Diverged: the loss is not finite; the last checkpoint stays.
     """
+    if start:
+        card = card | {"start": weights.start(task.module, start)}
     card = json.loads(json.dumps(card))
     out.mkdir(parents=True, exist_ok=True)
     with _threads(schedule.threads), asked_to_stop() as stop:

@@ -13,6 +13,8 @@ from torch import Tensor, nn
 from medor_learn.errors import WeightsError
 
 WEIGHTS, CONFIG, CARD = "weights.safetensors", "config.json", "card.md"
+LEARNT = ("data", "schedule", "metrics", "revision", "start")
+"""What of a config tells how weights came about."""
 
 
 def save(
@@ -48,14 +50,26 @@ def load(
         WeightsError: what is missing, superfluous, of another shape or unreadable.
     """
     config = read_config(folder)
-    try:
-        state = load_file(folder / WEIGHTS)
-    except (OSError, SafetensorError) as error:
-        raise WeightsError(f"{folder / WEIGHTS}: expected a safetensors file ({error})") from error
+    state = _read(folder)
     module = build(config)
     _check(folder, module.state_dict(), state)
     module.load_state_dict(state)
     return module.to(device).eval(), config
+
+
+def start(module: nn.Module, folder: Path) -> dict[str, Any]:
+    """Give a network the weights of a folder to go on from.
+
+    Returns:
+        What that folder says of how they were learnt, for the card of what comes of it.
+
+    Raises:
+        WeightsError: they do not fit.
+    """
+    config, state = read_config(folder), _read(folder)
+    _check(folder, module.state_dict(), state)
+    module.load_state_dict(state)
+    return {name: config[name] for name in LEARNT if name in config}
 
 
 def read_config(folder: Path) -> dict[str, Any]:
@@ -74,6 +88,13 @@ def markdown(card: Mapping[str, Any]) -> str:
     """A card as a page: text as it is, anything else as JSON."""
     parts = [f"## {heading}\n\n{_prose(text)}\n" for heading, text in card.items()]
     return "\n".join(["# Model card\n", *parts])
+
+
+def _read(folder: Path) -> dict[str, Tensor]:
+    try:
+        return load_file(folder / WEIGHTS)
+    except (OSError, SafetensorError) as error:
+        raise WeightsError(f"{folder / WEIGHTS}: expected a safetensors file ({error})") from error
 
 
 def _prose(text: Any) -> str:
@@ -101,4 +122,4 @@ def _check(folder: Path, wanted: Mapping[str, Tensor], found: Mapping[str, Tenso
     ]
     if faults:
         more = f" and {len(faults) - 3} more" if len(faults) > 3 else ""
-        raise WeightsError(f"{folder} does not fit the network of its config: {'; '.join(faults[:3])}{more}")
+        raise WeightsError(f"{folder} does not fit the network: {'; '.join(faults[:3])}{more}")

@@ -27,6 +27,7 @@ def canonical(
     test: tuple[Path, ...],
     out: Path,
     preset: Literal["cpu", "paper-small", "paper", "garmentnets", "garmentnets-small"] = "cpu",
+    start: Path | None = None,
     hours: float | None = None,
     steps: int | None = None,
     plain: bool = False,
@@ -51,6 +52,7 @@ def canonical(
         test: folders of recon data of held-out garments.
         out: folder of the run; the best weights are in its folder best.
         preset: of the network and how it is taught.
+        start: folder of weights to begin with instead of random ones.
         hours: of CPU time to spend over all resumptions; the learning rate decays with them.
         steps: to take; without hours, 20000 if left out.
         plain: compare with the labels as they are, without the turns that cannot be told apart.
@@ -83,7 +85,7 @@ def canonical(
         threads=threads,
     )
     task = CanonicalTask(module, chosen, views, held_out, seed, validated)
-    done = train(task, out, schedule, card=card, tensorboard=tensorboard)
+    done = train(task, out, schedule, card=card, start=start, tensorboard=tensorboard)
     sys.stdout.write(json.dumps(done) + "\n")
 
 

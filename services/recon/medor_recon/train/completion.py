@@ -50,6 +50,7 @@ def completion(
     canonical: Path | None = None,
     predicted: float | None = None,
     held_out: float = 0.1,
+    start: Path | None = None,
     hours: float | None = None,
     steps: int | None = None,
     batch: int | None = None,
@@ -75,6 +76,7 @@ def completion(
         canonical: folder of weights of a canonicaliser whose views are learnt from, too.
         predicted: share of these views, if not what the preset says; the others have true coordinates with errors.
         held_out: share of the garments to validate on, the last of every so many.
+        start: folder of weights to begin with instead of random ones.
         hours: of CPU time to spend over all resumptions; the learning rate decays with them.
         steps: to take; without hours, 20000 if left out.
         batch: views of a step, if not what the preset says.
@@ -105,7 +107,8 @@ def completion(
         seed=seed,
         threads=threads,
     )
-    done = train(_task(chosen, material, card, seed, device), out, schedule, card=card, tensorboard=tensorboard)
+    task = _task(chosen, material, card, seed, device)
+    done = train(task, out, schedule, card=card, start=start, tensorboard=tensorboard)
     if done["ended"] != "interrupted":
         done["meshes"] = finish(out / "best", chosen, material, device)
     sys.stdout.write(json.dumps(done) + "\n")
