@@ -1,25 +1,20 @@
 """How fast the cloth solver is: `python -m benchmarks.solver`.
 
-Times pick-and-places from crumpled starts on garments held out from training, their scaling over threads, and the
-solver beside PyBullet's soft body on one and the same garment and motion. CPU seconds; run it on an idle machine.
+Times pick-and-places from crumpled starts on garments held out from training, and their scaling over threads. CPU
+seconds; run it on an idle machine. Beside PyBullet's soft body: `python -m medor_sim.compare`.
 """
 
 import os
-import tempfile
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from benchmarks.soft_body import SoftBody
 from medor_cloth.garment import CATEGORIES, Garment, generate
 from medor_cloth.goals import flattened, solver_of
-from medor_cloth.integration import FRAME_S
 from medor_cloth.intersection import self_intersections
-from medor_cloth.picker import PULL_FRAMES, pull
 from medor_cloth.rollout import rollouts
 from medor_cloth.solver import ClothState, Solver
 from medor_cloth.start import dropped, random_pick
@@ -37,10 +32,6 @@ class Options:
     """Pick-and-places per garment."""
     vertices: int = 750
     """Size of the garments the candidates are rolled out on."""
-    bullet_vertices: int = 500
-    """Size of the T-shirt that PyBullet simulates too."""
-    bullet_s: float = 0.1
-    """Simulated time of the pull in PyBullet; 0 leaves it out."""
 
 
 def main(options: Options) -> None:
@@ -55,8 +46,6 @@ def main(options: Options) -> None:
             f"{MANY} candidates {MANY * seconds.mean():.0f} CPU-s"
         )
     threads(options)
-    if options.bullet_s:
-        beside_bullet(options)
 
 
 def candidates(garment: Garment, solver: Solver, state: ClothState, n: int) -> tuple[NDArray[np.float64], float]:
@@ -85,28 +74,6 @@ def threads(options: Options) -> None:
     print(
         f"threads: {len(picks)} candidates take {alone:.1f} s on {one}, {together:.1f} s on {n}: "
         f"{alone / together:.2f} times as fast; {MANY} candidates {MANY * together / len(picks):.0f} s"
-    )
-
-
-def beside_bullet(options: Options) -> None:
-    """Prints the simulated seconds per CPU second of the same pull in this solver and in PyBullet."""
-    garment = of_size("tshirt", options.bullet_vertices)
-    solver, state = crumpled(garment)
-    pick, place = (points[0] for points in random_picks(state, 1))
-    path = pull(pick, place)
-    begin = time.process_time()
-    solver.advance(solver.placed(state, pick), PULL_FRAMES, picker_path=path, holding=np.ones(PULL_FRAMES, bool))
-    ours = PULL_FRAMES * FRAME_S / (time.process_time() - begin)
-    with tempfile.TemporaryDirectory() as folder:
-        body = SoftBody(garment.laid_flat(), garment.faces, Path(folder) / "cloth.obj")
-        body.place(state.positions)
-        begin = time.process_time()
-        body.pull(pick, (place - pick) / (PULL_FRAMES * FRAME_S), options.bullet_s)
-        theirs = options.bullet_s / (time.process_time() - begin)
-        body.close()
-    print(
-        f"T-shirt of {len(garment.vertices)} vertices, crumpled, pulled: {ours:.2f} simulated s per CPU-s, "
-        f"PyBullet {theirs:.3f}: {ours / theirs:.0f} times as fast"
     )
 
 
