@@ -11,6 +11,7 @@ TASK ?= flatten
 SEED ?= 1
 PICKS ?= 10
 CANDIDATES ?= 100
+BENCH ?=
 
 .PHONY: help setup demo up doctor test test-all check format bench clean
 
@@ -50,8 +51,8 @@ format: setup  ## Format and fix
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: setup  ## Closed-loop table over the bus (resumable)
-	$(BIN)/python -m benchmarks.run --out runs/bench
+bench: setup  ## Closed loop of every method, with tables and report (resumable): make bench BENCH="--states 10"
+	$(BIN)/python -m benchmarks.run --out runs/bench $(BENCH)
 
 clean:  ## Remove the environment and everything generated
 	rm -rf $(VENV) runs .pytest_cache .ruff_cache .hypothesis

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +85,7 @@ def at_picks(one: Episode) -> NDArray[np.float64]:
     return one.ni[[pick for pick in AT_PICKS if pick < len(one.ni)] or [-1]]
 
 
-def over_cells(members: Iterable[Episode], statistic: Callable[..., NDArray[np.float64]]) -> float:
+def over_cells(members: Iterable[Episode], statistic: Callable[..., Any]) -> float:
     """Mean over tasks, categories and picks of a statistic over episodes."""
     cells: dict[tuple[str, str], list[NDArray[np.float64]]] = {}
     for one in members:

@@ -12,7 +12,7 @@ from benchmarks.episodes import Variant
 from benchmarks.published import METHODS
 
 COLOURS = (
-    "#1b1b1b", "#7a7a7a", "#0b5fa5", "#0b5fa5", "#e07b00", "#b8860b", "#c2337a", "#7b3fa0",
+    "#1b1b1b", "#7a7a7a", "#0b5fa5", "#0b5fa5", "#e07b00", "#b3202a", "#d66ba0", "#7b3fa0",
     "#1f8a4c", "#8c564b", "#12a0a8", "#b0b0b0",
 )  # fmt: skip
 """By method, in the order of the table. With the solver in place of learned dynamics a line is dashed."""
@@ -86,7 +86,7 @@ def _names(curves: Sequence[Curve], frame: Frame) -> str:
 
 def bar(row: Row, low: float) -> str:
     """A row's NI as a dot, its interval as a line, the paper's figure as a hollow diamond, on an axis up to 1."""
-    width, height = 200, 20
+    width, height = 160, 20
 
     def x(ni: float) -> float:
         return 6 + (width - 12) * (ni - low) / (1 - low)

@@ -47,7 +47,8 @@ class ClosedLoop:
             except MedorError as error:
                 reasons[trial.key] = told(error)
                 skips.refused(trial, error)
-                self._tell(f"{trial.key}  {told(error)}")
+                over = f"; {trial.method} is left out for {trial.category}" if skips.reason(trial) else ""
+                self._tell(f"{trial.key}  {told(error)}{over}")
             else:
                 skips.works(trial)
                 pace.add(trial, time.monotonic() - began)

@@ -120,7 +120,7 @@ _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Medor: closed loop</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>
-body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 1280px; padding: 0 1rem;
+body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 1400px; padding: 0 1rem;
        background: #f6f6f4; color: #222 }}
 h1 {{ font-size: 1.5rem; margin: 0 0 .6rem }} h2 {{ font-size: 1.2rem; margin: 2rem 0 .6rem }}
 h3 {{ font-size: 1rem; margin: 1rem 0 .4rem }}
@@ -129,16 +129,17 @@ dt {{ color: #666 }} dd {{ margin: 0; overflow-wrap: anywhere }}
 .wide {{ overflow-x: auto; background: #fff; border: 1px solid #ddd; border-radius: 8px; padding: .4rem .6rem }}
 table {{ border-collapse: collapse; font-size: 13px; width: 100%; font-variant-numeric: tabular-nums }}
 td {{ padding: .18rem .4rem; border-bottom: 1px solid #eee; white-space: nowrap }}
-thead td {{ color: #666; border-bottom: 1px solid #bbb }} tbody td:first-child {{ font-weight: 600 }}
-.n {{ text-align: right }} .first td {{ border-top: 1px solid #999 }}
-.bar {{ width: 200px; height: 20px; display: block }}
+thead td {{ color: #666; white-space: normal; vertical-align: bottom; border-bottom: 1px solid #bbb }}
+tbody td:first-child {{ font-weight: 600 }}
+.n {{ text-align: right }} .first td {{ border-top: 2px solid #ccc }}
+.bar {{ width: 160px; height: 20px; display: block }}
 .plot polyline {{ fill: none; stroke-width: 2.2; stroke-linejoin: round }}
 .bar line:not([class]) {{ stroke-width: 2.5 }}
 .plot text {{ font-size: 11px; fill: #666 }} .plot text.name {{ font-weight: 600; fill: revert-layer }}
-.grid {{ stroke: #e4e4e0 }} .zero {{ stroke: #999 }} .paper {{ fill: #fff; fill-opacity: .6; stroke: #333 }}
+.grid {{ stroke: #e4e4e0 }} .zero {{ stroke: #999 }} .paper {{ fill: none; stroke: #333; stroke-width: 1.2 }}
 .task {{ background: #fff; border: 1px solid #ddd; border-radius: 8px; padding: .4rem 1rem 1rem; margin-bottom: 1rem }}
 .big svg {{ width: 100% }}
-.small {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(200px, 1fr)); gap: .6rem }}
+.small {{ display: grid; grid-template-columns: repeat(5, 1fr); gap: .6rem }}
 .strips {{ display: grid; grid-template-columns: repeat(auto-fill, minmax(420px, 1fr)); gap: .8rem }}
 figure {{ margin: 0 }} figcaption {{ font-size: 12px; color: #555; text-align: center }}
 .strips figcaption {{ text-align: left }} img {{ width: 100%; border-radius: 4px }}

@@ -96,7 +96,9 @@ def run(options: Options, console: Console) -> int:
     cell = {"MEDOR_SIM__ENGINE": options.engine}
     cell |= dict.fromkeys(("MEDOR_SIM__SOFTNESS", "MEDOR_DYNAMICS__SOFTNESS"), str(options.softness))
     with cell_bus(options.router, cell, (options.out / "logs").absolute()) as bus:
-        loop = ClosedLoop(bus, options.out, lambda line: console.print(line, highlight=False, markup=False))
+        loop = ClosedLoop(
+            bus, options.out, lambda line: console.print(line, highlight=False, markup=False, soft_wrap=True)
+        )
         reasons = loop.run(missing, results, skips)
     Missing(options.out / "missing.json").keep(reasons)
     return sum(trial.key in reasons and skips.reason(trial) is None for trial in missing)
