@@ -30,6 +30,8 @@ class Options:
     """Data set of held-out garments."""
     out: Path
     preset: Literal["cpu", "paper", "screen"] = "cpu"
+    start: Path | None = None
+    """Folder of weights to begin with instead of random ones."""
     hours: float | None = None
     """CPU hours, over all resumptions."""
     steps: int = 1_000_000
