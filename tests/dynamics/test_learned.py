@@ -129,8 +129,11 @@ def test_canonicalize_rewards_closeness_to_the_goal(backend, sheet, request_for)
 
 def test_weights_that_are_missing_are_said_so_with_the_way_to_them(tmp_path, sheet, request_for):
     mesh = sheet()
-    with pytest.raises(BadRequest, match=r"medor_dynamics\.train"):
-        learned(tmp_path / "none", 1, torch.float32).roll_out(request_for(mesh, *pulls_of(mesh)), Call())
+    request = request_for(mesh, *pulls_of(mesh))
+    with pytest.raises(BadRequest, match=r"medor_dynamics\.train --preset cpu"):
+        learned(tmp_path / "none", 1, torch.float32).roll_out(request, Call())
+    with pytest.raises(BadRequest, match="--preset screen"):
+        learned(tmp_path / "none", 1, torch.float32, preset="screen").roll_out(request, Call())
 
 
 def test_weights_are_read_from_their_folder(tmp_path, model, sheet, request_for):

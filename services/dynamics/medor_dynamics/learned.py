@@ -22,7 +22,7 @@ from medor_wire.content import ByContent
 from medor_wire.errors import BadRequest
 from medor_wire.messages import ClothMesh, RolloutProgress, RolloutRequest, Rollouts
 
-TRAINING = "python -m medor_dynamics.train --preset cpu --data DIR --test DIR --out DIR --hours 4"
+TRAINING = "python -m medor_dynamics.train --preset {} --data DIR --test DIR --out DIR --hours 4"
 LEFT_M = 2.0
 """A rollout with a vertex farther than this from the middle of the table along an axis has diverged [m]."""
 
@@ -51,7 +51,7 @@ class Learned:
         positions[grasping] = self._follow(nodes, request, held, grasping, call)
         diverged = ~(np.abs(positions) < LEFT_M).reshape(total, -1).all(axis=1)
         positions[diverged] = mesh.vertices
-        scores = rewards(positions, mesh.faces, request.reward, threads=self._threads)
+        scores = rewards(positions, mesh, request.reward, threads=self._threads)
         return Rollouts(
             positions=positions,
             rewards=scores - DIVERGED_PENALTY * diverged,
@@ -84,21 +84,23 @@ class Learned:
 class Untrained:
     """Stands where a model would be: says how to get one."""
 
-    def __init__(self, fault: str) -> None:
+    def __init__(self, fault: str, preset: str) -> None:
         self._fault = fault
+        self._preset = preset
 
     def roll_out(self, request: RolloutRequest, call: Call) -> Rollouts:
         """Raises `BadRequest` always: asking again would not help."""
-        raise BadRequest(f"backend 'learned' has no weights ({self._fault}); train them with `{TRAINING}`")
+        training = TRAINING.format(self._preset)
+        raise BadRequest(f"backend {request.backend!r} has no weights ({self._fault}); train them with `{training}`")
 
 
-def learned(folder: Path, threads: int, precision: torch.dtype) -> Learned | Untrained:
-    """The backend of the weights in a folder, on a GPU when there is one."""
+def learned(folder: Path, threads: int, precision: torch.dtype, *, preset: str = "cpu") -> Learned | Untrained:
+    """The backend of the weights in a folder, on a GPU when there is one; `preset` names what training makes them."""
     device = "cuda" if torch.cuda.is_available() else "cpu"
     try:
         return Learned(load(folder, device).predictor(precision), threads)
     except WeightsError as error:
-        return Untrained(str(error))
+        return Untrained(str(error), preset)
 
 
 def by_worn_shape(mesh: ClothMesh) -> ByContent[ClothMesh]:

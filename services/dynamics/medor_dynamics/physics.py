@@ -53,7 +53,7 @@ class Physics:
             raise
         diverged = ~np.isfinite(positions).reshape(total, -1).all(axis=1)
         positions[diverged] = mesh.vertices
-        scores = rewards(positions, mesh.faces, request.reward, threads=self._threads)
+        scores = rewards(positions, mesh, request.reward, threads=self._threads)
         return Rollouts(
             positions=positions,
             rewards=scores - DIVERGED_PENALTY * diverged,

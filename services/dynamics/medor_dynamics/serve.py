@@ -15,7 +15,7 @@ from medor_dynamics.flatten import Flattener
 from medor_dynamics.learned import learned
 from medor_dynamics.physics import Physics
 from medor_dynamics.roller import Roller
-from medor_dynamics.shipped import DEFAULT
+from medor_dynamics.shipped import DEFAULT, SCREEN
 from medor_dynamics.warm_up import warm_up
 from medor_wire import endpoints
 from medor_wire.bus import join
@@ -33,15 +33,23 @@ class Config(Settings, section="dynamics"):
     """How many times as easily as usual the cloth of backend `physics` bends."""
     weights: Path = DEFAULT
     """Folder of the learned model, as training leaves it in `best`."""
+    screen: Path = SCREEN
+    """Folder of the small model that tells promising candidates from others; without it planning is exhaustive."""
     precision: Literal["bfloat16", "float32"] = "bfloat16"
-    """Of the learned model's hidden values."""
+    """Of the learned models' hidden values."""
 
 
 def main(config: Config) -> None:
     threads = config.threads or -(-(os.cpu_count() or 1) // config.replicas)
     torch.set_num_threads(1)
-    physics = Physics(threads, config=SolverConfig().softer(config.softness))
-    roller = Roller({"physics": physics, "learned": learned(config.weights, threads, PRECISIONS[config.precision])})
+    precision = PRECISIONS[config.precision]
+    roller = Roller(
+        {
+            "physics": Physics(threads, config=SolverConfig().softer(config.softness)),
+            "learned": learned(config.weights, threads, precision),
+            "screen": learned(config.screen, threads, precision, preset="screen"),
+        }
+    )
     with join("dynamics", config.bus) as bus:
         bus.ready(False, "compiling")
         bus.serve(endpoints.ROLLOUT, roller.roll_out)

@@ -7,8 +7,11 @@ from medor_dynamics.model import Dynamics
 from medor_dynamics.preset import Preset
 from medor_learn import weights
 
-DEFAULT = Path(__file__).parent / "weights" / "cpu"
-"""The weights that come with this package."""
+WEIGHTS = Path(__file__).parent / "weights"
+DEFAULT = WEIGHTS / "cpu"
+"""The model that comes with this package."""
+SCREEN = WEIGHTS / "screen"
+"""The small one that screens candidates."""
 
 
 def load(folder: Path, device: str = "cpu") -> Dynamics:

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from medor_planner.sampling import Candidates
 from medor_wire.messages import ClothMesh, Plan, PlanRequest
 
-TOP = 20
-"""Candidates reported with a plan."""
 OUT_OF_GRASP_M = 1.0
 """Height of the no-op's picker over the highest vertex [m]."""
 
@@ -29,6 +27,8 @@ class Choice:
     rewards: NDArray[np.float64]
     no_op_reward: float | None
     """None when nothing was predicted at all: then a candidate is always chosen."""
+    drawn: int = 1
+    """How many there were before screening."""
 
     @classmethod
     def unrated(cls, candidates: Candidates) -> "Choice":
@@ -47,7 +47,7 @@ class Choice:
 
     def plan(self, request: PlanRequest, mesh: ClothMesh, timings_ms: dict[str, float]) -> Plan:
         """The choice as a plan with an id of its own. Doing nothing is told as a place equal to its pick."""
-        top = self.best_first[:TOP]
+        top = self.best_first[: request.report]
         pick, place = self.candidates.picks[top[0]], self.candidates.places[top[0]]
         no_op_reward = self.no_op_reward or 0.0
         return Plan(
@@ -64,7 +64,8 @@ class Choice:
             top_picks=self.candidates.picks[top],
             top_places=self.candidates.places[top],
             top_rewards=self.rewards[top],
-            candidates=len(self.candidates),
+            candidates=self.drawn,
+            survivors=len(self.candidates),
             executor=request.executor,
             timings_ms=timings_ms,
         )

@@ -70,6 +70,7 @@ class Episodes:
             candidates=request.candidates,
             seed=request.seed,
             executor=request.executor,
+            exhaustive=request.exhaustive,
         )
         plan = self._planner.plan_pick(
             asked, index, call, lambda progress: call.progress(EpisodeProgress(planning=progress))

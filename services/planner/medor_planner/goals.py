@@ -29,7 +29,12 @@ class Goals:
         request = canonical_of(mesh) if method.goals == "mesh" else template(mesh.category)
         arrays = (request.canonical, request.faces, request.panel_uv)
         goal_set = self._flattened(ByContent.of((request, cancel), request.category, *arrays))
-        return Reward(task="canonicalize", goals=goal_set.goals, matched=method.goals == "mesh")
+        return Reward(
+            task="canonicalize",
+            goals=goal_set.goals,
+            matched=method.goals == "mesh",
+            visible_only=method.visible_reward,
+        )
 
     def _flatten(self, asked: ByContent[tuple[FlattenRequest, threading.Event]]) -> GoalSet:
         request, cancel = asked.value

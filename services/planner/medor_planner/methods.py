@@ -1,6 +1,6 @@
 """Methods: named presets of what the planner sees, what it plans with and where its goals come from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from medor_wire.errors import BadRequest
@@ -13,11 +13,23 @@ class Method:
     name: str
     recon: str | None
     """Reconstruction method that makes the mesh; None: the simulator's true mesh."""
-    dynamics: str | None
+    dynamics: Literal["learned", "physics"] | None
     """Backend that rolls candidates out; None: no model, one random pick-and-place."""
     goals: Literal["mesh", "template"] = "template"
     """Whose canonical pose is the goal of `canonicalize`: the planned mesh's own, or a fixed garment's of the
     category, whose vertices do not correspond with the mesh."""
+    visible_reward: bool = False
+    """Whether hidden cloth is rolled out but does not count."""
+
+    @property
+    def screened(self) -> bool:
+        """Whether a smaller model may choose what is rolled out."""
+        return self.dynamics == "learned"
+
+    @property
+    def with_physics(self) -> "Method":
+        """The same, rolled out by the cloth solver."""
+        return replace(self, name=f"{self.name}+physics", dynamics="physics")
 
 
 VISIBLE = Method("visible", recon="visible", dynamics="physics")
@@ -29,17 +41,21 @@ ORACLE_MESH = Method("oracle-mesh", recon=None, dynamics="learned", goals="mesh"
 RANDOM = Method("random", recon="visible", dynamics=None)
 """A pick near the outline, a place off the cloth (MEDOR, robot baseline)."""
 
-MEDOR = Method("medor", recon="medor", dynamics="learned", goals="mesh")
-"""The mesh completed from the view and finetuned on it, rolled out by the learned model; goals are made of its own
-canonical pose (MEDOR)."""
-COMPLETED = (MEDOR,) + tuple(
-    Method(f"{recon}+physics", recon=recon, dynamics="physics", goals="mesh")
+COMPLETED = tuple(
+    Method(recon, recon, dynamics="learned", goals="mesh")
     for recon in ("medor", "held", "no-finetuning", "joint", "no-consistency", "no-relative", "garmentnets")
 )
-"""The completed mesh, rolled out by the cloth solver: MEDOR's "ground-truth dynamics" and the ablations of its
-reconstruction."""
+"""The mesh completed from the view, rolled out by the learned model; goals are made of its own canonical pose. First
+MEDOR, then the ablations of its reconstruction."""
+PARTIAL_REWARD = replace(COMPLETED[0], name="partial-reward", visible_reward=True)
+"""MEDOR, judging only what it saw (MEDOR, ablations)."""
+LEARNED = (*COMPLETED, PARTIAL_REWARD)
 
-METHODS = {method.name: method for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM, *COMPLETED)}
+METHODS = {
+    method.name: method
+    for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM, *LEARNED, *(each.with_physics for each in LEARNED))
+}
+"""All by name. `+physics`: the same with the cloth solver, MEDOR's ground-truth dynamics."""
 
 
 def method_named(name: str) -> Method:

@@ -13,8 +13,9 @@ from medor_planner.methods import Method, method_named
 from medor_planner.plans import Plans
 from medor_planner.random_policy import random_action
 from medor_planner.sampling import Candidates, Scene, sample
+from medor_planner.screening import Screening
 from medor_planner.shooting import CHUNK, Shooting
-from medor_planner.watching import Stages, cancelling
+from medor_planner.watching import Stage, Stages, cancelling
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Call
 from medor_wire.errors import BadRequest
@@ -32,15 +33,19 @@ from medor_wire.messages import (
     RolloutRequest,
 )
 
+SCREEN_CHUNK = 50
+"""Candidates per request to rate them: as much work as the rollouts of a fifth."""
+
 
 class Planner:
     """Plans by asking: the cell for what it sees, recon for the mesh, dynamics for what actions would do."""
 
-    def __init__(self, bus: Bus, plans: Plans, chunk: int = CHUNK) -> None:
+    def __init__(self, bus: Bus, plans: Plans, chunk: int = CHUNK, screening: Screening | None = None) -> None:
         self._bus = bus
         self._plans = plans
         self._goals = Goals(bus)
         self._chunk = chunk
+        self._screening = screening or Screening()
 
     def plan(self, request: PlanRequest, call: Call) -> Plan:
         """The best of `request.candidates` sampled actions, or doing nothing when that is predicted best.
@@ -74,8 +79,7 @@ class Planner:
                     reward = self._reward(method, request, scene.mesh, cancel)
                 with stages.stage("sample"):
                     candidates = sample(scene, request.candidates, rng, reachable=reachable)
-                with stages.stage("rollout"):
-                    choice = self._shoot(method, scene.mesh, candidates, reward, stages, cancel)
+                choice = self._shoot(method, request, scene.mesh, candidates, reward, stages, cancel)
         plan = choice.plan(request, scene.mesh, stages.total())
         self._plans.add(plan)
         return plan
@@ -91,7 +95,7 @@ class Planner:
 
     def _reward(self, method: Method, request: PlanRequest, mesh: ClothMesh, cancel: threading.Event) -> Reward:
         if request.task == "flatten":
-            return Reward(task="flatten")
+            return Reward(task="flatten", visible_only=method.visible_reward)
         return self._goals.reward(method, mesh, cancel)
 
     def _reachable(
@@ -103,16 +107,23 @@ class Planner:
     def _shoot(
         self,
         method: Method,
+        request: PlanRequest,
         mesh: ClothMesh,
         candidates: Candidates,
         reward: Reward,
         stages: Stages,
         cancel: threading.Event,
-    ) -> "Choice":
-        every = no_op(mesh) + candidates
-        request = RolloutRequest(
-            mesh=mesh, picks=every.picks, places=every.places, reward=reward, backend=method.dynamics or ""
-        )
-        shooting = Shooting(self._bus, request, cancel, self._chunk)
-        rewards = shooting.rewards(on_fraction=lambda fraction: stages.report("rollout", fraction))
-        return Choice(candidates, rewards[1:], float(rewards[0]))
+    ) -> Choice:
+        """Rolls candidates out: the survivors of screening, or all of them."""
+
+        def rewards(stage: Stage, some: Candidates, backend: str, chunk: int) -> NDArray[np.float64]:
+            asked = RolloutRequest(mesh=mesh, picks=some.picks, places=some.places, reward=reward, backend=backend)
+            with stages.stage(stage):
+                tell = partial(stages.report, stage)
+                return Shooting(self._bus, asked, cancel, chunk).rewards(on_fraction=tell)
+
+        drawn, screening = len(candidates), self._screening
+        if method.screened and not request.exhaustive and screening.leaves(drawn) < drawn:
+            candidates = screening.survivors(candidates, partial(rewards, "screen", chunk=SCREEN_CHUNK))
+        found = rewards("rollout", no_op(mesh) + candidates, method.dynamics or "", self._chunk)
+        return Choice(candidates, found[1:], float(found[0]), drawn)

@@ -3,10 +3,13 @@
 Plans run beside each other; actions and episodes one at a time, since there is one robot.
 """
 
+from pydantic import Field
+
 from medor_planner.episode import Episodes
 from medor_planner.executor import Executor
 from medor_planner.planner import Planner
 from medor_planner.plans import Plans
+from medor_planner.screening import BACKEND, KEEP, Screening
 from medor_planner.shooting import CHUNK
 from medor_wire import endpoints
 from medor_wire.bus import join
@@ -19,12 +22,16 @@ class Config(Settings, section="planner"):
     chunk: int = CHUNK
     """Candidates per request to a dynamics instance."""
     plans_at_once: int = 2
+    screen: str = BACKEND
+    """Dynamics backend that chooses which candidates are rolled out by learned methods; empty: none, all are."""
+    keep: float = Field(default=KEEP, gt=0, le=1)
+    """Share of the candidates that screening leaves."""
 
 
 def main(config: Config) -> None:
     with join("planner", config.bus) as bus:
         plans = Plans(config.keep_plans)
-        planner = Planner(bus, plans, config.chunk)
+        planner = Planner(bus, plans, config.chunk, Screening(config.screen, config.keep))
         executor = Executor(bus, plans)
         bus.serve(endpoints.PLAN, planner.plan, workers=config.plans_at_once)
         bus.serve(endpoints.EXECUTE, executor.execute)

@@ -1,14 +1,16 @@
 """Rollouts of one plan's candidates, shared by all live dynamics instances.
 
 The candidates are cut into chunks whose size does not depend on how many instances there are; every instance
-takes the next chunk when it has answered the last one. A chunk whose instance is lost goes to another.
+takes the next chunk when it has answered the last one, so that a fast one does more of them. A chunk whose instance is
+lost goes to another. When none is left to take, an instance rolls out again what another has not answered yet, and the
+first answer counts: the slowest instance delays a plan by no more than a chunk of the fastest.
 """
 
 import logging
 import math
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 
 import numpy as np
@@ -41,6 +43,7 @@ class Shooting:
         count = len(request.picks)
         self._chunks = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]
         self._waiting = deque(range(len(self._chunks)))
+        self._running: Counter[int] = Counter()
         self._done = np.zeros(len(self._chunks), np.int64)
         self._rewards: dict[int, NDArray[np.float64]] = {}
         self._failure: BaseException | None = None
@@ -72,17 +75,18 @@ class Shooting:
         reported = -1
         while not self._finished:
             self._hire(workers)
-            if any(worker.is_alive() for worker in workers.values()):
-                last_worked = time.monotonic()
-            elif time.monotonic() - last_worked > GRACE_S:
-                raise Unavailable(f"no dynamics instance left, {len(self._rewards)} of {len(self._chunks)} chunks done")
-            with self._changed:
-                self._changed.wait(0.05)
-                done = int(self._done.sum())
+            at_work = any(worker.is_alive() for worker in workers.values())
             if self._failure is not None:
                 raise self._failure
             if self._cancel.is_set():
                 raise Cancelled("planning was cancelled")
+            if at_work:
+                last_worked = time.monotonic()
+            elif not self._finished and time.monotonic() - last_worked > GRACE_S:
+                raise Unavailable(f"no dynamics instance left, {len(self._rewards)} of {len(self._chunks)} chunks done")
+            with self._changed:
+                self._changed.wait(0.05)
+                done = int(self._done.sum())
             if done > reported:
                 reported = done
                 on_fraction(done / len(self._request.picks))
@@ -140,25 +144,36 @@ class Shooting:
         return reply.rewards
 
     def _take(self) -> int | None:
+        """A chunk nobody has begun, else one that others are at work on."""
         with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._finished or self._stop.is_set())
-            return None if self._finished or self._stop.is_set() else self._waiting.popleft()
+            if self._finished or self._stop.is_set():
+                return None
+            index = self._waiting.popleft() if self._waiting else self._most_awaited()
+            self._running[index] += 1
+            return index
+
+    def _most_awaited(self) -> int:
+        """The unanswered chunk with the fewest instances at work on it, of these the least advanced."""
+        unanswered = (index for index in range(len(self._chunks)) if index not in self._rewards)
+        return min(unanswered, key=lambda index: (self._running[index], self._done[index]))
 
     def _give_back(self, index: int) -> None:
         with self._changed:
-            self._done[index] = 0
-            self._waiting.appendleft(index)
+            self._running[index] -= 1
+            if not self._running[index] and index not in self._rewards:
+                self._done[index] = 0
+                self._waiting.appendleft(index)
             self._changed.notify_all()
 
     def _progress(self, index: int, done: int) -> None:
         with self._changed:
-            if index not in self._rewards:
-                self._done[index] = done
+            self._done[index] = max(self._done[index], done)
             self._changed.notify_all()
 
     def _finish(self, index: int, rewards: NDArray[np.float64]) -> None:
         with self._changed:
-            self._rewards[index] = rewards
+            self._running[index] -= 1
+            self._rewards.setdefault(index, rewards)
             self._done[index] = len(rewards)
             self._changed.notify_all()
 

@@ -169,6 +169,8 @@ class Reward(Message):
     goals: Annotated[F4, Shape("S G 3", "f4")] | None = None
     """Goal poses for `canonicalize`. `matched`: goal vertex i belongs to mesh vertex i, else nearest neighbours."""
     matched: bool = True
+    visible_only: bool = False
+    """Score only what the camera saw before the action (MEDOR, ablation of the reward)."""
 
     @model_validator(mode="after")
     def _goals_given(self) -> Self:
@@ -333,10 +335,14 @@ class PlanRequest(Message):
     candidates: int = Field(default=100, ge=1, le=5000)
     seed: int = Field(default=0, ge=0, lt=2**31)
     executor: Executor = "picker"
+    exhaustive: bool = False
+    """Roll every candidate out with the method's own model; none is screened out by a smaller one."""
+    report: int = Field(default=20, ge=1, le=5000)
+    """How many of the best candidates the plan tells."""
 
 
 class PlanProgress(Message):
-    stage: Literal["capture", "reconstruct", "goals", "sample", "rollout"]
+    stage: Literal["capture", "reconstruct", "goals", "sample", "screen", "rollout"]
     fraction: float
 
 
@@ -354,11 +360,13 @@ class Plan(Message):
     no_op_reward: float
     mesh: ClothMesh
     top_picks: Annotated[F4, Shape("T 3", "f4")]
-    """The best candidates, best first."""
+    """The best candidates that were rolled out, best first."""
     top_places: Annotated[F4, Shape("T 3", "f4")]
     top_rewards: Annotated[F8, Shape("T", "f8")]
     candidates: int
-    """Evaluated, the no-op not counted."""
+    """Drawn, the no-op not counted."""
+    survivors: int | None = None
+    """Those of them that the method's own model was asked about; the others were screened out."""
     executor: Executor = "picker"
     """Whose reach the candidates were sampled in; carries the plan out."""
     timings_ms: dict[str, float]
@@ -376,6 +384,8 @@ class EpisodeRequest(Message):
     candidates: int = Field(default=100, ge=1, le=5000)
     seed: int = Field(default=0, ge=0, lt=2**31)
     executor: Executor = "picker"
+    exhaustive: bool = False
+    """As in `PlanRequest`."""
     reset: ResetRequest | None = None
     """Absent: go on from what lies on the table."""
     stop_ni: float = 0.95
