@@ -39,6 +39,8 @@ class Options:
     """At most."""
     candidates: int = 100
     """Per pick."""
+    exhaustive: bool = False
+    """Roll all of them out, none screened out by a smaller model."""
     out: Path = Path("runs/demo")
     """Where `episode.json` and `report.html` are written."""
     key: str = ""
@@ -81,7 +83,7 @@ def _run(door: httpx.Client, options: Options, console: Console) -> EpisodeState
             "garment_seed": options.seed,
             "state": "drop",
             "seed": options.seed,
-            "options": {"candidates": options.candidates},
+            "options": {"candidates": options.candidates, "exhaustive": options.exhaustive},
         },
     )
     started.raise_for_status()

@@ -212,10 +212,14 @@ class ClearCommand(Command):
 # --- planning -------------------------------------------------------------------------------------------------
 
 
+Exhaustive = Annotated[bool, Field(description="Leave none to a smaller model: roll every candidate out.")]
+
+
 class PlanOptions(Command):
     candidates: Annotated[int, Field(ge=1, le=5000, description="Pick-and-places tried in the model.")] = 100
     seed: Seed = 0
     executor: ExecutorName = "picker"
+    exhaustive: Exhaustive = False
 
 
 class PlanCommand(Command):
@@ -238,6 +242,7 @@ class PlanCommand(Command):
             candidates=self.options.candidates,
             seed=self.options.seed,
             executor=self.options.executor,
+            exhaustive=self.options.exhaustive,
         )
 
 
@@ -332,6 +337,7 @@ class OutcomeReport(Report):
 class EpisodeOptions(Command):
     candidates: Annotated[int, Field(ge=1, le=5000)] = 100
     executor: ExecutorName = "picker"
+    exhaustive: Exhaustive = False
 
 
 class EpisodeCommand(Command):
@@ -360,6 +366,7 @@ class EpisodeCommand(Command):
             candidates=self.options.candidates,
             seed=self.seed,
             executor=self.options.executor,
+            exhaustive=self.options.exhaustive,
             reset=self._reset(),
         )
 

@@ -43,6 +43,7 @@ def demo(
     seed: int = 1,
     picks: int = 10,
     candidates: int = 100,
+    exhaustive: bool = False,
     out: Path = Path("runs/demo"),
     url: str | None = None,
     key: str = "",
@@ -56,6 +57,7 @@ def demo(
         seed: of the garment, the crumpling and the planning.
         picks: at most.
         candidates: pick-and-places imagined per pick.
+        exhaustive: imagine each in full, none screened out by a smaller model.
         out: folder for the results.
         url: of a running cell; without it one is started and ended.
         key: API key of that cell, when it asks for one.
@@ -71,6 +73,7 @@ def demo(
         "key": key,
     }
     options = [text for name, value in words.items() for text in (f"--{name}", str(value))]
+    options += ["--exhaustive"] if exhaustive else []
 
     def play(url: str) -> int:
         return subprocess.call([sys.executable, "-m", "medor_gateway.demo", "--url", url, *options])
