@@ -38,16 +38,16 @@ def main(options: Options) -> None:
         cell.wait_ready()
         reset = ResetRequest(category=options.category, garment_seed=HELD_OUT_SEED)
         cell.bus.ask(endpoints.RESET, reset)
-        plan_once(cell.bus, options, candidates=8, seed=0)  # what is made once per garment is not measured
+        plan_once(cell.bus, options.category, candidates=8, seed=0)  # what is made once per garment is not measured
         for number in range(options.plans):
             before = rollout_cpu_s(cell)
-            plan = plan_once(cell.bus, options, options.candidates, seed=number + 1)
+            plan = plan_once(cell.bus, options.category, options.candidates, seed=number + 1)
             spent = rollout_cpu_s(cell) - before
             console.print(line(plan, options, spent), memory_line(cell), soft_wrap=True)
 
 
-def plan_once(bus: Bus, options: Options, candidates: int, seed: int) -> Plan:
-    request = PlanRequest(category=options.category, method="oracle", candidates=candidates, seed=seed)
+def plan_once(bus: Bus, category: Category, candidates: int, seed: int, method: str = "oracle") -> Plan:
+    request = PlanRequest(category=category, method=method, candidates=candidates, seed=seed, exhaustive=True)
     return bus.ask(endpoints.PLAN, request)
 
 
