@@ -13,7 +13,8 @@ from medor_sim.collect.scene import Scene
 
 CAMERA = overhead(200)
 FREE_FRAMES = 30
-LENGTH_M = (0.15, 0.4)
+LENGTH_M = (0.05, 0.4)
+"""Of a pull, least and most [m]: MEDOR records from 15 cm, its planner asks for 5 to 20 cm; both are here."""
 PICKER_ABOVE_M = 0.01
 """Height of the picker's centre over the vertex it aims at [m]."""
 PER_START = 2
@@ -52,7 +53,7 @@ def trajectory(scene: Scene, state: ClothState, rng: np.random.Generator) -> dic
 
 
 def random_place(pick: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
-    """Where a pull ends (3,) [m]: 15 to 40 cm away, level or higher, seen by the camera."""
+    """Where a pull ends (3,) [m]: 5 to 40 cm away, level or higher, seen by the camera."""
     while True:
         direction = rng.uniform((-0.5, -0.5, 0.0), (0.5, 0.5, 0.5))
         place = pick + rng.uniform(*LENGTH_M) * direction / np.linalg.norm(direction)
