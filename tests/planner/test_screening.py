@@ -16,6 +16,7 @@ from medor_wire.errors import BadRequest
 from medor_wire.messages import PlanProgress, PlanRequest, RolloutRequest, Rollouts
 
 ASKED = PlanRequest(category="tshirt", method="oracle-mesh", candidates=200, seed=5)
+LEFT = 30
 Opinion = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Picks and places (K, 3) -> rewards (K,)."""
 
@@ -64,7 +65,7 @@ def test_a_screen_that_thinks_like_the_model_changes_nothing(lab, think):
     exhaustive = lab.bus.ask(endpoints.PLAN, ASKED.model_copy(update={"exhaustive": True}))
     np.testing.assert_array_equal(screened.top_picks, exhaustive.top_picks)
     np.testing.assert_array_equal(screened.top_rewards, exhaustive.top_rewards)
-    assert (screened.candidates, screened.survivors) == (200, 40)
+    assert (screened.candidates, screened.survivors) == (200, LEFT)
     assert (exhaustive.candidates, exhaustive.survivors) == (200, 200)
 
 
@@ -72,10 +73,10 @@ def test_the_model_is_asked_about_survivors_and_doing_nothing_only(lab, think):
     learned, screen = think(length, length)
     lab.bus.ask(endpoints.PLAN, ASKED)
     assert sum(screen.asked) == 200
-    assert sum(learned.asked) == 40 + 1
+    assert sum(learned.asked) == LEFT + 1
     lab.bus.ask(endpoints.PLAN, ASKED.model_copy(update={"exhaustive": True}))
     assert sum(screen.asked) == 200
-    assert sum(learned.asked) == 40 + 1 + 200 + 1
+    assert sum(learned.asked) == LEFT + 1 + 200 + 1
 
 
 def test_the_screen_proposes_and_the_model_chooses(lab, think):
@@ -83,9 +84,9 @@ def test_the_screen_proposes_and_the_model_chooses(lab, think):
     think(length, shortness)
     plan = lab.bus.ask(endpoints.PLAN, ASKED.model_copy(update={"report": 200}))
     every = lab.bus.ask(endpoints.PLAN, ASKED.model_copy(update={"report": 200, "exhaustive": True}))
-    assert len(plan.top_rewards) == 40
+    assert len(plan.top_rewards) == LEFT
     assert len(every.top_rewards) == 200
-    np.testing.assert_array_equal(plan.top_rewards, every.top_rewards[-40:])
+    np.testing.assert_array_equal(plan.top_rewards, every.top_rewards[-LEFT:])
     assert plan.reward == plan.top_rewards[0]
 
 

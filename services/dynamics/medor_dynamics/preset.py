@@ -40,6 +40,6 @@ class Preset:
 PAPER = Preset()
 CPU = Preset(width=64, blocks=5, global_vector=False, nearest=8, close_mesh_edges=False, frame="pull", normalize=True)
 """Small enough for 500 rollouts in seconds on two cores."""
-SCREEN = replace(CPU, width=32, blocks=3, nearest=4)
+SCREEN = replace(CPU, width=32, blocks=2, nearest=4)
 """Tells promising candidates from others at a fraction of the price; what is left is rolled out by a larger model."""
 PRESETS = {"paper": PAPER, "cpu": CPU, "screen": SCREEN}

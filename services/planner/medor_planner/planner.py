@@ -34,7 +34,7 @@ from medor_wire.messages import (
 )
 
 SCREEN_CHUNK = 50
-"""Candidates per request to rate them: as much work as the rollouts of a fifth."""
+"""Candidates per request to rate them: about as much work as to roll out a third of them."""
 
 
 class Planner:

@@ -18,7 +18,7 @@ from medor_wire.errors import BadRequest
 log = logging.getLogger(__name__)
 
 BACKEND = "screen"
-KEEP = 0.2
+KEEP = 0.15
 """Share of the candidates that survives."""
 AT_LEAST = 20
 """Survivors that a plan has in any case: those it reports."""
