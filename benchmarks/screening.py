@@ -76,10 +76,12 @@ def main(options: Options) -> None:
             for name, decision in decisions(cell.bus, options):
                 found.append(decision)
                 console.print(f"{len(found)} {name}: {decision.exhaustive_s:.1f} s exhaustive", highlight=False)
-            if found:
-                console.print(table(found, options.keep), planned(cell.bus, options), soft_wrap=True)
+            console.print(planned(cell.bus, options), soft_wrap=True)
         except BadRequest as refused:
             raise SystemExit(f"{refused}") from refused
+        finally:  # Ctrl-C leaves what there is
+            if found:
+                console.print(table(found, options.keep))
 
 
 def decisions(bus: Bus, options: Options) -> Iterator[tuple[str, Decision]]:

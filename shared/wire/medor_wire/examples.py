@@ -85,6 +85,7 @@ def plan() -> m.Plan:
         top_places=TOP + np.float32(0.1),
         top_rewards=np.array([0.045, 0.043]),
         candidates=2,
+        survivors=2,
         timings_ms={"reconstruct": 120.0, "rollout": 800.0},
     )
 
