@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from medor_recon.refine import HELD, JOINT, NO_CONSISTENCY, PAPER, RefineConfig
+from medor_recon.refine import HELD, ISOMETRIC, JOINT, NO_CONSISTENCY, PAPER, RefineConfig
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ METHODS = {
         Method("joint", refine=JOINT),
         Method("no-consistency", refine=NO_CONSISTENCY),
         Method("held", refine=HELD),
+        Method("isometric", refine=ISOMETRIC),
         Method("field", completion="paper-small"),
         Method("field-no-finetuning", completion="paper-small", refine=None),
         Method("no-relative", completion="paper-small-no-relative", refine=None),
@@ -34,4 +35,5 @@ METHODS = {
 }
 """`medor` and its ablations (MEDOR, section V-D): `joint`, `no-consistency` and `no-finetuning` differ from it in
 finetuning alone; `no-relative` from `field-no-finetuning` in what the warp is relative to. `held` finetunes with the
-edge prior; `garmentnets` is the baseline: PointNet++, absolute positions, no finetuning."""
+edge prior, `isometric` from a layout that keeps lengths; `garmentnets` is the baseline: PointNet++, absolute positions,
+no finetuning."""

@@ -19,9 +19,21 @@ class Phase:
 
 
 @dataclass(frozen=True)
+class Isometry:
+    """A first layout that keeps lengths; not in the paper's method."""
+
+    weight: float = 2.0
+    """Of an edge's deformation, against a vertex's distance to the points that share its canonical coordinate."""
+    doubt_m: float = 0.05
+    """Distance at which such a point counts a quarter [m]."""
+    iterations: int = 15
+
+
+@dataclass(frozen=True)
 class RefineConfig:
     """All of finetuning's constants."""
 
+    isometry: Isometry | None = None
     phases: tuple[Phase, ...] = (Phase(), Phase(consistency=0.0))
     """Canonical coordinates first bring every vertex roughly home; their error must not hold it there."""
     learning_rate: float = 1e-3
@@ -39,3 +51,5 @@ NO_CONSISTENCY = RefineConfig(phases=(Phase(consistency=0.0), Phase(consistency=
 """Canonical coordinates are not used (MEDOR, ablation "no consistency")."""
 HELD = RefineConfig(phases=(Phase(stretch=1.0), Phase(consistency=0.0, stretch=1.0)))
 """With an edge prior: what moves takes its neighbours along, hidden ones too."""
+ISOMETRIC = RefineConfig(isometry=Isometry(), phases=(Phase(consistency=0.0, stretch=5.0),))
+"""Laid out with its lengths kept, then moved onto the points with the edge prior."""

@@ -14,6 +14,7 @@ from medor_recon.refine import terms
 from medor_recon.refine.adam import Adam
 from medor_recon.refine.binding import bind
 from medor_recon.refine.config import PAPER, Phase, RefineConfig
+from medor_recon.refine.isometric import lay_out
 from medor_wire.errors import ReconstructionFailed
 
 
@@ -50,7 +51,7 @@ def refine(completed: Completed, canonicalized: Canonicalized, config: RefineCon
     if not np.isfinite(completed.positions).all():
         raise ReconstructionFailed("the completed mesh has coordinates that are not finite")
     problem = _Problem(completed, canonicalized, config or PAPER)
-    positions = completed.positions.astype(np.float64)
+    positions = problem.laid_out(completed) if config else completed.positions.astype(np.float64)
     losses: dict[str, list[float]] = {}
     for phase in config.phases if config else ():
         positions = problem.descend(positions, phase, losses)
@@ -89,6 +90,13 @@ class _Problem:
         self.edges = _edges(completed.faces)
         first, second = completed.canonical[self.edges].astype(np.float64).swapaxes(0, 1)
         self.rest_lengths = np.linalg.norm(second - first, axis=1)
+
+    def laid_out(self, completed: Completed) -> NDArray[np.float64]:
+        """Where finetuning begins (V, 3)."""
+        positions = completed.positions.astype(np.float64)
+        if self.config.isometry is None:
+            return positions
+        return lay_out(positions, completed.canonical, self.edges, self.binding, self.config.isometry)
 
     def descend(self, positions: NDArray, phase: Phase, losses: dict[str, list[float]]) -> NDArray[np.float64]:
         """Where the vertices (V, 3) are after a phase; every iteration's values are appended to `losses`."""
