@@ -110,6 +110,14 @@ def test_two_layers_rest_one_thickness_apart():
     assert (upper - lower).min() > HALF_THICKNESS
 
 
+def test_without_layers_all_cloth_rests_on_the_table():
+    vertices, faces = sheet(8, 8)
+    both = np.concatenate([vertices, vertices + [0.004, 0.003, 0.012]]).astype(np.float32)
+    solver = solver_of(both, np.concatenate([faces, faces + len(vertices)]), layers=False)
+    state = solver.advance(solver.rest(both + np.array([0, 0, HALF_THICKNESS], np.float32)), 60)
+    assert state.positions[:, 2] == pytest.approx(HALF_THICKNESS, abs=1e-5)
+
+
 def test_layers_do_not_pass_through_each_other_at_speed():
     vertices, faces = sheet(8, 8)
     both = np.concatenate([vertices, vertices + [0.004, 0.003, 0.1]]).astype(np.float32)

@@ -28,7 +28,7 @@ def test_with_physics_differs_from_the_learned_method_in_dynamics_alone():
     pairs = [(METHODS[name.removesuffix("+physics")], each) for name, each in METHODS.items() if "+" in name]
     assert {learned.name for learned, _ in pairs} >= {"medor", "partial-reward", "garmentnets"}
     for learned, physics in pairs:
-        assert (learned.dynamics, physics.dynamics) == ("learned", "physics")
+        assert (learned.dynamics, physics.dynamics) == ("learned", "layerless")
         assert (learned.recon, learned.goals, learned.visible_reward) == (
             physics.recon,
             physics.goals,

@@ -4,6 +4,7 @@ Stateless: any number of replicas share the candidates of one plan.
 """
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -30,7 +31,7 @@ class Config(Settings, section="dynamics"):
     replicas: int = 1
     """Replicas on this machine, which share its processors."""
     softness: float = Field(default=1.0, gt=0)
-    """How many times as easily as usual the cloth of backend `physics` bends."""
+    """How many times as easily as usual the cloth of backends `physics` and `layerless` bends."""
     weights: Path = DEFAULT
     """Folder of the learned model, as training leaves it in `best`."""
     screen: Path = SCREEN
@@ -43,9 +44,11 @@ def main(config: Config) -> None:
     threads = config.threads or -(-(os.cpu_count() or 1) // config.replicas)
     torch.set_num_threads(1)
     precision = PRECISIONS[config.precision]
+    cloth = SolverConfig().softer(config.softness)
     roller = Roller(
         {
-            "physics": Physics(threads, config=SolverConfig().softer(config.softness)),
+            "physics": Physics(threads, config=cloth),
+            "layerless": Physics(threads, config=replace(cloth, layers=False)),
             "learned": learned(config.weights, threads, precision),
             "screen": learned(config.screen, threads, precision, preset="screen"),
         }

@@ -13,7 +13,7 @@ class Method:
     name: str
     recon: str | None
     """Reconstruction method that makes the mesh; None: the simulator's true mesh."""
-    dynamics: Literal["learned", "physics"] | None
+    dynamics: Literal["learned", "physics", "layerless"] | None
     """Backend that rolls candidates out; None: no model, one random pick-and-place."""
     goals: Literal["mesh", "template"] = "template"
     """Whose canonical pose is the goal of `canonicalize`: the planned mesh's own, or a fixed garment's of the
@@ -28,8 +28,8 @@ class Method:
 
     @property
     def with_physics(self) -> "Method":
-        """The same, rolled out by the cloth solver."""
-        return replace(self, name=f"{self.name}+physics", dynamics="physics")
+        """The same, rolled out by the cloth solver; completed layers run through each other, so it lets them."""
+        return replace(self, name=f"{self.name}+physics", dynamics="layerless")
 
 
 VISIBLE = Method("visible", recon="visible", dynamics="physics")
@@ -43,7 +43,7 @@ RANDOM = Method("random", recon="visible", dynamics=None)
 
 COMPLETED = tuple(
     Method(recon, recon, dynamics="learned", goals="mesh")
-    for recon in ("medor", "held", "no-finetuning", "joint", "no-consistency", "no-relative", "garmentnets")
+    for recon in ("medor", "isometric", "no-finetuning", "joint", "no-consistency", "no-relative", "garmentnets")
 )
 """The mesh completed from the view, rolled out by the learned model; goals are made of its own canonical pose. First
 MEDOR, then the ablations of its reconstruction."""

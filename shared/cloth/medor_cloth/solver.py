@@ -38,6 +38,9 @@ class SolverConfig:
     with twice as many it folds like cardboard."""
     contact_damping: float = 0.5
     """Share of the relative velocity along the normal of each contact that is taken away every fourth substep."""
+    layers: bool = True
+    """Whether layers touch. Without, they pass through each other and all rest on the table: for meshes whose layers
+    run through each other to begin with, which contact would tear apart."""
 
     def softer(self, times: float) -> "SolverConfig":
         """The same cloth, so many times as easy to bend."""
@@ -98,6 +101,7 @@ class ClothState:
         )
 
 
+NO_POINTS = np.empty((0, 2), np.int32)
 PARKED = np.array([-1.0, -1.0, 1.0], np.float32)
 """Where the picker waits, out of reach of the cloth [m]."""
 
@@ -119,7 +123,7 @@ class Solver:
             cloth.across,
             cloth.stretch,
             cloth.bend,
-            np.concatenate([corners, cloth.edges]),
+            np.concatenate([corners, cloth.edges]) if self.config.layers else NO_POINTS,
             cloth.areas,
             cloth.squares,
         )
