@@ -33,6 +33,7 @@ class Trial:
     executor: Executor = "picker"
     engine: Engine = "xpbd"
     softness: float = 1.0
+    exhaustive: bool = False
 
     @property
     def key(self) -> str:
@@ -65,9 +66,10 @@ class Trial:
     @property
     def unusual(self) -> list[str]:
         """Who picks when not the flying gripper, what moves the cloth when not our solver, how soft it is when not as
-        usual."""
+        usual, and whether no candidate is screened out."""
         usual = {"picker", "xpbd", "softness 1"}
-        return [it for it in (self.executor, self.engine, f"softness {self.softness:.3g}") if it not in usual]
+        words = [it for it in (self.executor, self.engine, f"softness {self.softness:.3g}") if it not in usual]
+        return words + ["exhaustive"] * self.exhaustive
 
     def request(self) -> EpisodeRequest:
         """Garment and crumple depend on the state alone, so that all methods and tasks meet the same states."""
@@ -79,6 +81,7 @@ class Trial:
             candidates=self.candidates,
             seed=self.state,
             executor=self.executor,
+            exhaustive=self.exhaustive,
             reset=ResetRequest(
                 category=self.category,
                 garment_seed=HELD_OUT_SEED + self.state,
@@ -94,9 +97,11 @@ def _unusual(word: str) -> dict[str, Any]:
         return {"executor": word}
     if word in get_args(Engine):
         return {"engine": word}
+    if word == "exhaustive":
+        return {"exhaustive": True}
     name, _, value = word.partition(" ")
     if name != "softness":
-        raise ValueError(f"expected an executor, an engine or a softness, got {word!r}")
+        raise ValueError(f"expected an executor, an engine, a softness or exhaustive, got {word!r}")
     return {"softness": float(value)}
 
 
@@ -111,11 +116,13 @@ def trials(
     executors: tuple[Executor, ...] = ("picker",),
     engine: Engine = "xpbd",
     softness: float = 1.0,
+    exhaustive: bool = False,
 ) -> Iterator[Trial]:
     """State by state, so that an unfinished run has every method on the same first states."""
+    cell = engine, softness, exhaustive
     for state in range(states):
         for category in categories:
             for task in tasks:
                 for method in methods:
                     for executor in executors:
-                        yield Trial(method, category, task, state, start, picks, candidates, executor, engine, softness)
+                        yield Trial(method, category, task, state, start, picks, candidates, executor, *cell)

@@ -49,6 +49,8 @@ class Options:
     """What moves the cloth in the cell that is started: our solver, or PyBullet's soft body (slow)."""
     softness: float = 1.0
     """How many times as easily as usual the cloth bends, on the table and in the planner's physics alike."""
+    exhaustive: bool = False
+    """Roll every candidate out: no small model screens those of the learned methods."""
     out: Path = Path("runs/bench")
     router: str = ""
     """Zenoh endpoint of a running cell; empty starts one."""
@@ -60,7 +62,7 @@ class Options:
     def trials(self) -> list[Trial]:
         """Everything asked for."""
         what = self.methods, self.categories, self.tasks, self.states, self.start, self.picks, self.candidates
-        return list(trials(*what, self.executor, self.engine, self.softness))
+        return list(trials(*what, self.executor, self.engine, self.softness, self.exhaustive))
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from benchmarks.protocol import Trial, trials
         Trial("medor+physics", "skirt", "canonicalize", 12, "picks", 3, 500),
         Trial("no-relative", "dress", "flatten", 1, "drop", 10, 30, executor="panda"),
         Trial("visible", "jumpsuit", "flatten", 1, "flat", 10, 30, "panda", "bullet", 0.25),
+        Trial("medor", "tshirt", "flatten", 0, "drop", 10, 500, exhaustive=True),
     ],
 )
 def test_a_trial_is_told_by_its_key(trial: Trial) -> None:
