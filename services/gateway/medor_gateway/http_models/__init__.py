@@ -1,0 +1,97 @@
+"""What travels over HTTP: the JSON twins of the wire's messages, arrays as lists or PNG, each with an example.
+
+Metres, world frame, unless a name says else.
+"""
+
+from medor_gateway.http_models.base import (
+    Command,
+    EndReason,
+    ExecutorName,
+    MethodName,
+    Png,
+    Point,
+    Quadruple,
+    Report,
+    Seed,
+    Text,
+    Triple,
+    example,
+    point,
+)
+from medor_gateway.http_models.cell import (
+    CellReport,
+    ClearCommand,
+    GarmentReport,
+    ResetCommand,
+    ScoreReport,
+    StopCommand,
+    StopReport,
+)
+from medor_gateway.http_models.episodes import (
+    EpisodeCommand,
+    EpisodeList,
+    EpisodeOptions,
+    EpisodeState,
+    PickDetail,
+    PickReport,
+)
+from medor_gateway.http_models.health import Alive, InstanceHealth, Readiness, ServiceHealth
+from medor_gateway.http_models.observation import Observation
+from medor_gateway.http_models.planning import (
+    Action,
+    Candidate,
+    Exhaustive,
+    MeshLink,
+    OutcomeReport,
+    PlanCommand,
+    PlanOptions,
+    PlanResult,
+    PlanState,
+    Predicted,
+    Progress,
+)
+
+__all__ = [
+    "Action",
+    "Alive",
+    "Candidate",
+    "CellReport",
+    "ClearCommand",
+    "Command",
+    "EndReason",
+    "EpisodeCommand",
+    "EpisodeList",
+    "EpisodeOptions",
+    "EpisodeState",
+    "ExecutorName",
+    "Exhaustive",
+    "GarmentReport",
+    "InstanceHealth",
+    "MeshLink",
+    "MethodName",
+    "Observation",
+    "OutcomeReport",
+    "PickDetail",
+    "PickReport",
+    "PlanCommand",
+    "PlanOptions",
+    "PlanResult",
+    "PlanState",
+    "Png",
+    "Point",
+    "Predicted",
+    "Progress",
+    "Quadruple",
+    "Readiness",
+    "Report",
+    "ResetCommand",
+    "ScoreReport",
+    "Seed",
+    "ServiceHealth",
+    "StopCommand",
+    "StopReport",
+    "Text",
+    "Triple",
+    "example",
+    "point",
+]

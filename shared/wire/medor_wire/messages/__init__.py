@@ -1,0 +1,103 @@
+"""Every message that travels between services: frozen, typed, shape-checked.
+
+World frame: metres, right-handed, z up, table at z = 0. Canonical space: the worn pose, z the body axis, front -y.
+"""
+
+from medor_wire.messages.base import (
+    F4,
+    F8,
+    I4,
+    Bools,
+    Category,
+    Empty,
+    Executor,
+    Message,
+    StartState,
+    Task,
+    array_fields,
+)
+from medor_wire.messages.cell import (
+    ActOutcome,
+    ActRequest,
+    CellStatus,
+    ClearStop,
+    EmergencyStop,
+    Lease,
+    LeaseRequest,
+    Reach,
+    ReachRequest,
+)
+from medor_wire.messages.cloth import (
+    ClothMesh,
+    FlattenRequest,
+    GoalSet,
+    Reconstruction,
+    ReconstructProgress,
+    ReconstructRequest,
+    Reward,
+    RolloutProgress,
+    RolloutRequest,
+    Rollouts,
+)
+from medor_wire.messages.infrastructure import Heartbeat
+from medor_wire.messages.planning import (
+    Episode,
+    EpisodePick,
+    EpisodeProgress,
+    EpisodeRequest,
+    ExecuteRequest,
+    Plan,
+    PlanProgress,
+    PlanRequest,
+)
+from medor_wire.messages.simulated import GarmentId, ResetRequest, Score, Truth, UploadGarment
+from medor_wire.messages.view import CameraInfo, DepthView
+
+__all__ = [
+    "F4",
+    "F8",
+    "I4",
+    "ActOutcome",
+    "ActRequest",
+    "Bools",
+    "CameraInfo",
+    "Category",
+    "CellStatus",
+    "ClearStop",
+    "ClothMesh",
+    "DepthView",
+    "EmergencyStop",
+    "Empty",
+    "Episode",
+    "EpisodePick",
+    "EpisodeProgress",
+    "EpisodeRequest",
+    "ExecuteRequest",
+    "Executor",
+    "FlattenRequest",
+    "GarmentId",
+    "GoalSet",
+    "Heartbeat",
+    "Lease",
+    "LeaseRequest",
+    "Message",
+    "Plan",
+    "PlanProgress",
+    "PlanRequest",
+    "Reach",
+    "ReachRequest",
+    "ReconstructProgress",
+    "ReconstructRequest",
+    "Reconstruction",
+    "ResetRequest",
+    "Reward",
+    "RolloutProgress",
+    "RolloutRequest",
+    "Rollouts",
+    "Score",
+    "StartState",
+    "Task",
+    "Truth",
+    "UploadGarment",
+    "array_fields",
+]
