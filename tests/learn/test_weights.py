@@ -36,9 +36,11 @@ def test_a_network_comes_back_as_it_was(tmp_path, trained):
 def test_shipped_weights_are_half_as_large_and_nearly_as_good(tmp_path):
     module = build({"width": 64}).eval()
     weights.save(tmp_path / "full", module, {"width": 64}, {})
-    weights.save(tmp_path / "half", module, {"width": 64}, {}, half=True)
+    (tmp_path / "full" / "templates.npz").write_bytes(b"beside the weights")
+    weights.ship(tmp_path / "full", tmp_path / "half")
     size = {name: (tmp_path / name / "weights.safetensors").stat().st_size for name in ("full", "half")}
     assert size["half"] < 0.75 * size["full"]
+    assert (tmp_path / "half" / "templates.npz").read_bytes() == b"beside the weights"
     loaded, _ = weights.load(tmp_path / "half", build)
     assert all(tensor.dtype != torch.float16 for tensor in loaded.state_dict().values())
     x = torch.randn(3, 2, 6, 6)

@@ -1,6 +1,7 @@
 """A network as a folder: `weights.safetensors`, `config.json` (all it takes to build it), `card.md` (for people)."""
 
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,7 @@ LEARNT = ("data", "schedule", "metrics", "revision", "start")
 """What of a config tells how weights came about."""
 
 
-def save(
-    folder: Path, module: nn.Module, config: Mapping[str, Any], card: Mapping[str, Any], half: bool = False
-) -> None:
+def save(folder: Path, module: nn.Module, config: Mapping[str, Any], card: Mapping[str, Any]) -> None:
     """Write a network so that `load` needs nothing else; each file is replaced at once.
 
     Args:
@@ -27,10 +26,9 @@ def save(
         module: the network.
         config: what `build` takes, as JSON: preset, normaliser, seeds, revision, metrics.
         card: what a reader should know, heading by heading.
-        half: store matrices and kernels as float16, to ship them. Vectors (biases, statistics of norms) stay.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    state = {name: _stored(tensor, half) for name, tensor in module.state_dict().items()}
+    state = {name: tensor.detach().cpu().contiguous() for name, tensor in module.state_dict().items()}
     _replace(folder / WEIGHTS, lambda path: save_file(state, path))
     _replace(folder / CONFIG, lambda path: path.write_text(json.dumps(config, indent=2) + "\n"))
     _replace(folder / CARD, lambda path: path.write_text(markdown(card)))
@@ -72,6 +70,20 @@ def start(module: nn.Module, folder: Path) -> dict[str, Any]:
     return {name: config[name] for name in LEARNT if name in config}
 
 
+def ship(folder: Path, to: Path) -> None:
+    """Copy a folder to where it is published, half as large: matrices and kernels as float16.
+
+    Vectors (biases, statistics of norms) stay as they are, and so does all else in the folder.
+
+    Raises:
+        WeightsError: it holds no network.
+    """
+    read_config(folder)
+    state = {name: _halved(tensor) for name, tensor in _read(folder).items()}
+    shutil.copytree(folder, to, dirs_exist_ok=True)
+    _replace(to / WEIGHTS, lambda path: save_file(state, path))
+
+
 def read_config(folder: Path) -> dict[str, Any]:
     """What a folder says about its network.
 
@@ -101,14 +113,14 @@ def _prose(text: Any) -> str:
     return text if isinstance(text, str) else f"```json\n{json.dumps(text, indent=2)}\n```"
 
 
-def _stored(tensor: Tensor, half: bool) -> Tensor:
-    tensor = tensor.detach().cpu().contiguous()
-    return tensor.to(torch.float16) if half and tensor.is_floating_point() and tensor.ndim > 1 else tensor
+def _halved(tensor: Tensor) -> Tensor:
+    return tensor.to(torch.float16) if tensor.is_floating_point() and tensor.ndim > 1 else tensor
 
 
 def _replace(path: Path, write: Callable[[Path], Any]) -> None:
     partial = path.with_name(f".{path.name}.partial")
     write(partial)
+    partial.chmod(0o644)
     partial.replace(path)
 
 
