@@ -49,7 +49,7 @@ def think(lab) -> Callable[..., tuple[Opinionated, Opinionated]]:
 
     def make(learned: Opinion, screen: Opinion | None, replicas: int = 1) -> tuple[Opinionated, Opinionated]:
         lab.members["dynamics-1"].close()
-        backends = dict.fromkeys(("learned", "physics"), Opinionated(learned))
+        backends: dict[str, Opinionated] = dict.fromkeys(("learned", "physics"), Opinionated(learned))
         if screen is not None:
             backends["screen"] = Opinionated(screen)
         for number in range(replicas):

@@ -76,4 +76,7 @@ def _laplacian(edges: NDArray[np.integer], count: int) -> csc_matrix:
 
 def _summed(rows: NDArray[np.integer], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """(count, n) sums of the values (m, n) that go to each row."""
-    return np.stack([np.bincount(rows, weights=column, minlength=count) for column in values.T], axis=1)
+    sums = np.zeros((count, values.shape[1]))
+    for column, into in zip(values.T, sums.T, strict=True):
+        into[:] = np.bincount(rows, weights=column, minlength=count)
+    return sums
