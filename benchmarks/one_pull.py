@@ -69,7 +69,7 @@ class Foresight:
         gain: normalized improvement by the candidate it chose; 0 when it chose none.
         best: by the best candidate.
         chance: by a candidate drawn at random, on average.
-        rank: Spearman correlation of its rewards with the true ones.
+        rank: Spearman correlation of its rewards with the true ones; 0 where either are all the same.
     """
 
     method: str
@@ -97,7 +97,9 @@ class Worth:
         """A method's rewards (K + 1,), the first of them for doing nothing."""
         best = int(rewards[1:].argmax())
         gain = self.gains[best] if rewards[1 + best] > rewards[0] else 0.0
-        rank = float(np.nan_to_num(spearmanr(rewards[1:], self.gains).statistic))
+        rank = (
+            float(spearmanr(rewards[1:], self.gains).statistic) if np.ptp(rewards[1:]) and np.ptp(self.gains) else 0.0
+        )
         return Foresight(
             method, category, task, state, float(gain), float(self.gains.max()), float(self.gains.mean()), rank
         )
