@@ -3,6 +3,7 @@ import pytest
 
 from medor_cloth.coverage import coverage
 from medor_cloth.engine import Engine
+from medor_cloth.errors import ClothError
 from medor_cloth.garment import Garment, generate
 from medor_cloth.goals import solver_of
 from medor_cloth.picker import SETTLED_SPEED
@@ -209,3 +210,9 @@ def as_obj(garment: Garment) -> bytes:
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in garment.vertices]
     lines += [f"f {a} {b} {c}" for a, b, c in garment.faces + 1]
     return "\n".join(lines).encode()
+
+
+def test_cloth_that_left_the_table_downwards_is_no_state(engine, lying):
+    beside = lying.positions + np.array([2, 0, 0], np.float32)
+    with pytest.raises(ClothError, match="fell through the table"):
+        engine.advance(engine.rest(beside), 40)

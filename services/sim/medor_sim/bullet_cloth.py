@@ -16,6 +16,8 @@ from medor_sim.soft_body import SoftBody
 EDGE_M = 0.016
 """Mean edge length of the garments generated for it: 370 to 630 vertices, what PyBullet's cloth is stable with."""
 MAX_VERTICES = 700
+FALLEN_M = -0.05
+"""Cloth so far below the table's top has fallen through it, as PyBullet lets it now and then [m]."""
 CALM_SHARE = 0.995
 """Share of the vertices that must be slow in a settled cloth."""
 
@@ -69,7 +71,7 @@ class BulletCloth:
         """The cloth at most some frames of 0.01 s later; see `medor_cloth.solver.Solver.advance`.
 
         Raises:
-            ClothError: The cloth flew apart.
+            ClothError: The cloth flew apart, or fell through the table.
         """
         path = np.broadcast_to(
             state.picker if picker_path is None else np.asarray(picker_path, np.float32), (frames, 3)
@@ -110,6 +112,8 @@ class BulletCloth:
         """The state one frame after another."""
         if not np.isfinite(positions).all():
             raise ClothError("PyBullet's cloth flew apart")
+        if positions[:, 2].min() < FALLEN_M:
+            raise ClothError("PyBullet's cloth fell through the table")
         velocities = (positions - before.positions) / np.float32(FRAME_S)
         slow = np.linalg.norm(velocities, axis=1) <= (settle_speed or 0)
         calm = before.calm + 1 if settle_speed and slow.mean() >= CALM_SHARE else 0
