@@ -19,6 +19,7 @@ from medor_cloth.solver import ClothState
 from medor_dynamics.flatten import Flattener
 from medor_dynamics.physics import Physics
 from medor_dynamics.roller import Roller
+from medor_dynamics.warm_up import warm_up
 from medor_planner.episode import Episodes
 from medor_planner.executor import Executor
 from medor_planner.planner import Planner
@@ -46,6 +47,12 @@ from medor_wire.messages import (
     Truth,
 )
 from medor_wire.motion import Check, Motion
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled() -> None:
+    """Kernels compile under the interpreter lock, for longer than a lease lives: do that before there is one."""
+    warm_up(Roller({"physics": Physics(threads=1)}))
 
 
 @pytest.fixture
