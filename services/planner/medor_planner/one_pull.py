@@ -1,4 +1,4 @@
-"""How well each method foresees a single pull: `python -m benchmarks.one_pull --methods visible medor medor+physics`.
+"""How well each method foresees a single pull: `python -m medor_planner.one_pull --methods visible medor`.
 
 Starts a simulated cell and drops held-out garments (others than those of the closed loop). The cloth solver rolls some
 candidates out on the true mesh: that is what they are worth. Then every method rates the same candidates on the mesh it
@@ -19,7 +19,7 @@ import tyro
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
-from scipy.stats import spearmanr
+from scipy.stats import rankdata
 
 from medor_planner.choice import no_op
 from medor_planner.goals import Goals
@@ -97,11 +97,10 @@ class Worth:
         """A method's rewards (K + 1,), the first of them for doing nothing."""
         best = int(rewards[1:].argmax())
         gain = self.gains[best] if rewards[1 + best] > rewards[0] else 0.0
-        rank = (
-            float(spearmanr(rewards[1:], self.gains).statistic) if np.ptp(rewards[1:]) and np.ptp(self.gains) else 0.0
-        )
+        differ = np.ptp(rewards[1:]) > 0 and np.ptp(self.gains) > 0
+        rank = np.corrcoef(rankdata(rewards[1:]), rankdata(self.gains))[0, 1] if differ else 0.0
         return Foresight(
-            method, category, task, state, float(gain), float(self.gains.max()), float(self.gains.mean()), rank
+            method, category, task, state, float(gain), float(self.gains.max()), float(self.gains.mean()), float(rank)
         )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.one_pull import Options, Records, Worth, wanted
+from medor_planner.one_pull import Options, Records, Worth, wanted
 from medor_planner.sampling import Candidates
 
 GAINS = np.array([0.3, -0.2, 0.1, 0.0])
