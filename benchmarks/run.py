@@ -50,7 +50,7 @@ class Options:
     softness: float = 1.0
     """How many times as easily as usual the cloth bends, on the table and in the planner's physics alike."""
     exhaustive: bool = False
-    """Roll every candidate out: no small model screens those of the learned methods."""
+    """Roll every candidate out: no rough model screens them."""
     out: Path = Path("runs/bench")
     router: str = ""
     """Zenoh endpoint of a running cell; empty starts one."""

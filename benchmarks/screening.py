@@ -46,7 +46,7 @@ ROUNDS = 2000
 class Options:
     """What to measure."""
 
-    method: str = "oracle-mesh"
+    method: str = "medor+physics"
     keep: tuple[float, ...] = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
     """Shares of survivors."""
     candidates: int = 500
@@ -59,16 +59,14 @@ class Options:
     replicas: int = 2
     """Of one thread each."""
     weights: Path | None = None
-    """Folder of the model; else the one that is served by default."""
-    screen: Path | None = None
-    """Folder of the screen, likewise."""
+    """Folder of the learned model; else the one that is served by default."""
 
 
 def main(options: Options) -> None:
     console = Console()
     environment = {"MEDOR_DYNAMICS__REPLICAS": str(options.replicas), "MEDOR_DYNAMICS__THREADS": "1"}
-    folders = {"MEDOR_DYNAMICS__WEIGHTS": options.weights, "MEDOR_DYNAMICS__SCREEN": options.screen}
-    environment |= {name: str(folder.absolute()) for name, folder in folders.items() if folder}
+    if options.weights:
+        environment["MEDOR_DYNAMICS__WEIGHTS"] = str(options.weights.absolute())
     with Launcher("sim", echo=False, environment=environment) as cell:
         cell.wait_ready()
         found: list[Decision] = []
@@ -110,7 +108,7 @@ def exhaustive(bus: Bus, options: Options, category: Category, task: Task, seed:
 
 
 def decided(bus: Bus, options: Options, plan: Plan) -> Decision:
-    rated = rolled_out(bus, plan.mesh, plan.task, plan.top_picks, plan.top_places, "screen")
+    rated = rolled_out(bus, plan.mesh, plan.task, plan.top_picks, plan.top_places, "coarse")
     chance = np.random.default_rng(0).random(len(rated.rewards))
     every = {
         chosen(plan.top_rewards, rating, plan.no_op_reward, keep)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import zarr
 
+from medor_cloth.cluster import cluster
 from medor_cloth.dataset import FORMAT, STORED, Dataset
 from medor_dynamics.evaluate import motionless_errors, rigid_errors
+from medor_dynamics.node_mesh import NodeMesh
 from medor_dynamics.preset import CPU, PAPER, PULL_STEPS, STEP_S, STEPS
 from medor_dynamics.samples import Recording, Sampler, recordings, seen, stretches
 
@@ -103,10 +105,8 @@ def write_shard(folder: Path, mesh, frames: np.ndarray, move: np.ndarray, nodes)
 
 @pytest.mark.parametrize("preset", [CPU, PAPER, replace(CPU, rest="true")])
 def test_a_trajectory_of_a_data_set_as_the_model_sees_it(tmp_path, sheet, preset):
-    from medor_dynamics.node_mesh import NodeMesh
-
     mesh = sheet(side=0.1, panels=True)
-    nodes = NodeMesh.over(mesh.vertices, *_clustered(mesh))
+    nodes = NodeMesh.over(mesh.vertices, cluster(mesh.vertices, mesh.faces))
     pull = np.array([0.03, 0.04, 0.05], np.float32)
     squeezed = mesh.vertices * np.array([0.9, 1, 1], np.float32)
     frames = squeezed + np.linspace(0, 1, STEPS + 1, dtype=np.float32)[:, None, None] * pull
@@ -120,10 +120,3 @@ def test_a_trajectory_of_a_data_set_as_the_model_sees_it(tmp_path, sheet, preset
     shape = mesh.vertices if preset.rest == "true" else squeezed
     ends = shape[nodes.ids][nodes.edges]
     np.testing.assert_allclose(seen_by_model.rest, np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), atol=1e-4)
-
-
-def _clustered(mesh):
-    from medor_cloth.cluster import cluster
-
-    found = cluster(mesh.vertices, mesh.faces)
-    return found.ids, found.edges

@@ -1,4 +1,4 @@
-"""Plans whose candidates a cheap model has screened. Both models are told what to think of a candidate."""
+"""Plans whose candidates a rough model has screened. Both models are told what to think of a candidate."""
 
 import logging
 from collections.abc import Callable
@@ -51,10 +51,10 @@ def think(lab) -> Callable[..., tuple[Opinionated, Opinionated]]:
         lab.members["dynamics-1"].close()
         backends: dict[str, Opinionated] = dict.fromkeys(("learned", "physics"), Opinionated(learned))
         if screen is not None:
-            backends["screen"] = Opinionated(screen)
+            backends["coarse"] = Opinionated(screen)
         for number in range(replicas):
             lab.join(f"thinking-{number}").serve(endpoints.ROLLOUT, Roller(backends).roll_out)
-        return backends["learned"], backends.get("screen", Opinionated(shortness))
+        return backends["learned"], backends.get("coarse", Opinionated(shortness))
 
     return make
 
@@ -118,7 +118,7 @@ def test_screening_is_told_and_timed_before_the_rollouts(lab, think):
     assert {"screen", "rollout"} <= set(plan.timings_ms)
 
 
-def test_without_weights_for_it_planning_is_exhaustive_and_says_so_once(lab, think, caplog):
+def test_where_the_screen_refuses_planning_is_exhaustive_and_says_so_once(lab, think, caplog):
     learned, _ = think(length, None)
     with caplog.at_level(logging.WARNING):
         plans = [lab.bus.ask(endpoints.PLAN, ASKED.model_copy(update={"seed": seed})) for seed in (1, 2)]
@@ -162,6 +162,6 @@ def test_other_failures_of_the_screen_are_the_plans():
         Screening().survivors(drawn(100), lost)
 
     def refuse(candidates: Candidates, backend: str) -> np.ndarray:
-        raise BadRequest("no weights")
+        raise BadRequest("no coarse mesh")
 
     assert len(Screening().survivors(drawn(100), refuse)) == 100

@@ -34,7 +34,7 @@ HELD_OUT_SEED = 800_001
 class Options:
     """What to time."""
 
-    preset: Literal["cpu", "paper", "screen"] = "cpu"
+    preset: Literal["cpu", "paper"] = "cpu"
     """Size of the model; its weights are random unless given."""
     weights: Path | None = None
     category: Category = "trousers"

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from medor_cloth.cluster import cluster
+from medor_cloth.cluster import Clustered, cluster
 from medor_dynamics.graphs import Graphs
 from medor_dynamics.preset import Preset
 from medor_wire.messages import ClothMesh
@@ -23,6 +23,7 @@ class NodeMesh:
     Attributes:
         ids: (n,) vertex of each node.
         edges: (e, 2) undirected, of nodes.
+        faces: (m, 3) of nodes; none for recorded data, which has no use for them.
         rest_shape: (V, 3) the garment as it is worn, where its layers lie apart [m].
         neighbors: (V, 3) nodes next to each vertex in the rest shape, nearest first.
         weights: (V, 3) float32 share of each neighbor in the vertex's motion; adds up to 1.
@@ -30,6 +31,7 @@ class NodeMesh:
 
     ids: NDArray[np.int32]
     edges: NDArray[np.int32]
+    faces: NDArray[np.int32]
     rest_shape: NDArray[np.float32]
     neighbors: NDArray[np.int64]
     weights: NDArray[np.float32]
@@ -38,17 +40,17 @@ class NodeMesh:
     def of(cls, mesh: ClothMesh) -> Self:
         """Clusters a mesh as it is worn; a mesh that does not know its worn shape is clustered as it lies."""
         rest_shape = mesh.vertices if mesh.canonical is None else mesh.canonical
-        nodes = cluster(rest_shape, mesh.faces)
-        return cls.over(rest_shape, nodes.ids, nodes.edges)
+        return cls.over(rest_shape, cluster(rest_shape, mesh.faces))
 
     @classmethod
-    def over(cls, rest_shape: NDArray[np.float32], ids: NDArray[np.int32], edges: NDArray[np.int32]) -> Self:
+    def over(cls, rest_shape: NDArray[np.float32], nodes: Clustered) -> Self:
+        ids = nodes.ids
         nearest = min(BLENDED, len(ids))
         distance, neighbors = KDTree(rest_shape[ids]).query(rest_shape, k=nearest)
         distance, neighbors = np.reshape(distance, (-1, nearest)), np.reshape(neighbors, (-1, nearest))
         weights = 1 / np.maximum(distance, 1e-6) ** 2
         weights /= weights.sum(axis=1, keepdims=True)
-        return cls(ids, edges, rest_shape, neighbors.astype(np.int64), weights.astype(np.float32))
+        return cls(ids, nodes.edges, nodes.faces, rest_shape, neighbors.astype(np.int64), weights.astype(np.float32))
 
     def node_of(self, vertex: int) -> int:
         """The node that stands for a vertex: the nearest in the rest shape, so never one of another layer."""

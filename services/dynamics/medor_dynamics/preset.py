@@ -1,6 +1,6 @@
 """What a dynamics model is made of, and the sizes that have a name."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 HISTORY = 5
@@ -40,6 +40,4 @@ class Preset:
 PAPER = Preset()
 CPU = Preset(width=64, blocks=5, global_vector=False, nearest=8, close_mesh_edges=False, frame="pull", normalize=True)
 """Small enough for 500 rollouts in seconds on two cores."""
-SCREEN = replace(CPU, width=32, blocks=2, nearest=4)
-"""Tells promising candidates from others at a fraction of the price; what is left is rolled out by a larger model."""
-PRESETS = {"paper": PAPER, "cpu": CPU, "screen": SCREEN}
+PRESETS = {"paper": PAPER, "cpu": CPU}

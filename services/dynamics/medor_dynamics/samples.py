@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from medor_cloth.cluster import Clustered
 from medor_cloth.dataset import Dataset, GarmentRecord, Trajectory
 from medor_dynamics.frame import headings, turned
 from medor_dynamics.graphs import Graphs
@@ -60,7 +61,8 @@ def recordings(dataset: Dataset, preset: Preset, *, visible_only: bool = False) 
 
 
 def recordings_of(record: GarmentRecord, preset: Preset, visible_only: bool) -> list[Recording]:
-    mesh = NodeMesh.over(record.garment.vertices, record["node_ids"], record["node_edges"])
+    nodes = Clustered(ids=record["node_ids"], faces=np.empty((0, 3), np.int32), edges=record["node_edges"])
+    mesh = NodeMesh.over(record.garment.vertices, nodes)
     return [recording(each, mesh, preset, visible_only) for each in record.trajectories()]
 
 

@@ -12,11 +12,12 @@ import torch
 from pydantic import Field
 
 from medor_cloth.solver import SolverConfig
+from medor_dynamics.coarse import Coarse
 from medor_dynamics.flatten import Flattener
 from medor_dynamics.learned import learned
 from medor_dynamics.physics import Physics
 from medor_dynamics.roller import Roller
-from medor_dynamics.shipped import DEFAULT, SCREEN
+from medor_dynamics.shipped import DEFAULT
 from medor_dynamics.warm_up import warm_up
 from medor_wire import endpoints
 from medor_wire.bus import join
@@ -31,11 +32,9 @@ class Config(Settings, section="dynamics"):
     replicas: int = 1
     """Replicas on this machine, which share its processors."""
     softness: float = Field(default=1.0, gt=0)
-    """How many times as easily as usual the cloth of backends `physics` and `layerless` bends."""
+    """How many times as easily as usual the cloth of all backends but `learned` bends."""
     weights: Path = DEFAULT
     """Folder of the learned model, as training leaves it in `best`."""
-    screen: Path = SCREEN
-    """Folder of the small model that tells promising candidates from others; without it planning is exhaustive."""
     precision: Literal["bfloat16", "float32"] = "bfloat16"
     """Of the learned models' hidden values."""
 
@@ -50,7 +49,7 @@ def main(config: Config) -> None:
             "physics": Physics(threads, config=cloth),
             "layerless": Physics(threads, config=replace(cloth, layers=False)),
             "learned": learned(config.weights, threads, precision),
-            "screen": learned(config.screen, threads, precision, preset="screen"),
+            "coarse": Coarse(threads, config=cloth),
         }
     )
     with join("dynamics", config.bus) as bus:

@@ -7,11 +7,8 @@ from medor_dynamics.model import Dynamics
 from medor_dynamics.preset import Preset
 from medor_learn import weights
 
-WEIGHTS = Path(__file__).parent / "weights"
-DEFAULT = WEIGHTS / "cpu"
+DEFAULT = Path(__file__).parent / "weights" / "cpu"
 """The model that comes with this package."""
-SCREEN = WEIGHTS / "screen"
-"""The small one that screens candidates."""
 
 
 def load(folder: Path, device: str = "cpu") -> Dynamics:

@@ -29,7 +29,7 @@ class Options:
     test: Path
     """Data set of held-out garments."""
     out: Path
-    preset: Literal["cpu", "paper", "screen"] = "cpu"
+    preset: Literal["cpu", "paper"] = "cpu"
     start: Path | None = None
     """Folder of weights to begin with instead of random ones."""
     hours: float | None = None

@@ -20,7 +20,7 @@ class Options:
     """What to write."""
 
     out: Path
-    preset: Literal["cpu", "paper", "screen"] = "cpu"
+    preset: Literal["cpu", "paper"] = "cpu"
     seed: int = 0
 
 

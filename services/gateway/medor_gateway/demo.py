@@ -40,7 +40,7 @@ class Options:
     candidates: int = 100
     """Per pick."""
     exhaustive: bool = False
-    """Roll all of them out, none screened out by a smaller model."""
+    """Roll all of them out, none screened out by a rougher model."""
     out: Path = Path("runs/demo")
     """Where `episode.json` and `report.html` are written."""
     key: str = ""

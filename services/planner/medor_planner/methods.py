@@ -23,8 +23,8 @@ class Method:
 
     @property
     def screened(self) -> bool:
-        """Whether a smaller model may choose what is rolled out."""
-        return self.dynamics == "learned"
+        """Whether a rough model may choose what is rolled out."""
+        return self.dynamics in ("learned", "layerless")
 
     @property
     def with_physics(self) -> "Method":

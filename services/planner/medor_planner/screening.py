@@ -1,7 +1,7 @@
-"""Screening: a small model rates all candidates, so that the method's own model need roll only the best ones out.
+"""Screening: a rough model rates all candidates, so that the method's own model need roll only the best ones out.
 
 What is left is chosen from by the method's own model, so screening can cost the best candidate but never mistake a bad
-one for it. Methods that plan with the cloth solver are not screened: they are what the others are measured by.
+one for it. Methods that plan with the whole cloth solver are not screened: they are what the others are measured by.
 """
 
 import logging
@@ -17,7 +17,7 @@ from medor_wire.errors import BadRequest
 
 log = logging.getLogger(__name__)
 
-BACKEND = "screen"
+BACKEND = "coarse"
 KEEP = 0.15
 """Share of the candidates that survives."""
 AT_LEAST = 20
@@ -26,7 +26,7 @@ AT_LEAST = 20
 
 @dataclass
 class Screening:
-    """Chooses survivors by a backend's rewards, when the dynamics instances have weights for it.
+    """Chooses survivors by a backend's rewards.
 
     Attributes:
         backend: of dynamics; empty: none, all candidates survive.

@@ -23,7 +23,7 @@ class Config(Settings, section="planner"):
     """Candidates per request to a dynamics instance."""
     plans_at_once: int = 2
     screen: str = BACKEND
-    """Dynamics backend that chooses which candidates are rolled out by learned methods; empty: none, all are."""
+    """Dynamics backend that chooses the candidates that are rolled out; empty: none, all are."""
     keep: float = Field(default=KEEP, gt=0, le=1)
     """Share of the candidates that screening leaves."""
 

@@ -57,7 +57,7 @@ def demo(
         seed: of the garment, the crumpling and the planning.
         picks: at most.
         candidates: pick-and-places imagined per pick.
-        exhaustive: imagine each in full, none screened out by a smaller model.
+        exhaustive: imagine each in full, none screened out by a rougher model.
         out: folder for the results.
         url: of a running cell; without it one is started and ended.
         key: API key of that cell, when it asks for one.
