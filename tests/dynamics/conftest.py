@@ -2,13 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+import zarr
 
 from medor_cloth.camera import overhead
 from medor_cloth.cloth import Cloth
+from medor_cloth.dataset import FORMAT, STORED
 from medor_cloth.picker import pick_place
 from medor_cloth.raster import visible_vertices
 from medor_cloth.solver import Solver
@@ -53,6 +56,32 @@ def request_for() -> Callable[..., RolloutRequest]:
         )
 
     return make
+
+
+@pytest.fixture
+def write_shard() -> Callable[..., None]:
+    return written_shard
+
+
+def written_shard(folder: Path, mesh: ClothMesh, frames: np.ndarray, move: np.ndarray, nodes: NodeMesh) -> None:
+    """One trajectory as `medor_sim.collect` writes it."""
+    plan = {"kind": "dynamics", "split": "train", "seed": 0}
+    shard = zarr.open_group(folder / "shard.zarr", mode="w", attributes={"format": FORMAT, "plan": plan})
+    group = shard.create_group("garment-000000", attributes={"category": "tshirt", "seed": 1, "first": 0})
+    arrays = {
+        "vertices": mesh.vertices,
+        "faces": mesh.faces,
+        "panel_uv": mesh.panel_uv,
+        "node_ids": nodes.ids,
+        "node_edges": nodes.edges,
+        "complete": np.array([True]),
+        "positions": STORED["positions"].store(frames)[None],
+        "visible": np.ones((1, len(nodes.ids)), bool),
+        "move": move[None],
+        "grasp": np.array([[nodes.node_of(0), 0]], np.int32),
+    }
+    for name, values in arrays.items():
+        group.create_array(name, data=np.ascontiguousarray(values))
 
 
 @pytest.fixture(scope="session")

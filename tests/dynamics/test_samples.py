@@ -1,13 +1,11 @@
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import zarr
 
 from medor_cloth.cluster import cluster
-from medor_cloth.dataset import FORMAT, STORED, Dataset
+from medor_cloth.dataset import Dataset
 from medor_dynamics.evaluate import motionless_errors, rigid_errors
 from medor_dynamics.node_mesh import NodeMesh
 from medor_dynamics.preset import CPU, PAPER, PULL_STEPS, STEP_S, STEPS
@@ -82,29 +80,8 @@ def test_what_the_camera_does_not_see_is_left_out(folded):
     np.testing.assert_allclose(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), part.rest, atol=1e-6)
 
 
-def write_shard(folder: Path, mesh, frames: np.ndarray, move: np.ndarray, nodes) -> None:
-    """One trajectory as `medor_sim.collect` writes it."""
-    plan = {"kind": "dynamics", "split": "train", "seed": 0}
-    shard = zarr.open_group(folder / "shard.zarr", mode="w", attributes={"format": FORMAT, "plan": plan})
-    group = shard.create_group("garment-000000", attributes={"category": "tshirt", "seed": 1, "first": 0})
-    arrays = {
-        "vertices": mesh.vertices,
-        "faces": mesh.faces,
-        "panel_uv": mesh.panel_uv,
-        "node_ids": nodes.ids,
-        "node_edges": nodes.edges,
-        "complete": np.array([True]),
-        "positions": STORED["positions"].store(frames)[None],
-        "visible": np.ones((1, len(nodes.ids)), bool),
-        "move": move[None],
-        "grasp": np.array([[nodes.node_of(0), 0]], np.int32),
-    }
-    for name, values in arrays.items():
-        group.create_array(name, data=np.ascontiguousarray(values))
-
-
 @pytest.mark.parametrize("preset", [CPU, PAPER, replace(CPU, rest="true")])
-def test_a_trajectory_of_a_data_set_as_the_model_sees_it(tmp_path, sheet, preset):
+def test_a_trajectory_of_a_data_set_as_the_model_sees_it(tmp_path, sheet, write_shard, preset):
     mesh = sheet(side=0.1, panels=True)
     nodes = NodeMesh.over(mesh.vertices, cluster(mesh.vertices, mesh.faces))
     pull = np.array([0.03, 0.04, 0.05], np.float32)

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,14 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from medor_cloth.dataset import Dataset
+from medor_cloth.dataset import Dataset, GarmentRecord
+from medor_cloth.solver import SolverConfig
+from medor_dynamics.coarse import Coarse
 from medor_dynamics.model import Dynamics, Predictor
+from medor_dynamics.physics import Physics
 from medor_dynamics.preset import PULL_STEPS, STEPS
-from medor_dynamics.samples import Recording, recordings, stretches
+from medor_dynamics.replay import replay_errors
+from medor_dynamics.samples import Recording, recordings_of, stretches
 from medor_dynamics.shipped import DEFAULT, load
 
 TOGETHER = 8
@@ -81,15 +86,21 @@ class Options:
 
 def main(options: Options) -> None:
     torch.set_num_threads(1)
-    model = load(options.weights)
-    by_category: dict[str, list[Recording]] = defaultdict(list)
-    for each in recordings(Dataset(options.test), model.preset, visible_only=options.visible_only):
-        by_category[each.category].append(each)
-    table = Table("category", "pulls", "model", "no motion", "rigid", title="mean error after 16 steps [mm]")
-    for category, found in by_category.items():
-        some = found[: options.at_most]
-        errors = [of[:, -1].mean() for of in (rollout_errors(model, some), motionless_errors(some), rigid_errors(some))]
-        table.add_row(category, str(len(some)), *(f"{1e3 * error:.1f}" for error in errors))
+    model, dataset = load(options.weights), Dataset(options.test)
+    rough = SolverConfig(layers=False)
+    solvers = {"whole": Physics(1), "without layers": Physics(1, config=rough), "coarse": Coarse(1)}
+    table = Table("category", "pulls", "model", "no motion", "rigid", *(f"solver, {name}" for name in solvers))
+    table.title = "mean error of the nodes after 16 steps [mm]"
+    by_category: dict[str, list[GarmentRecord]] = defaultdict(list)
+    for record in dataset.garments:
+        by_category[record.category].append(record)
+    for category, records in by_category.items():
+        every = (recordings_of(record, model.preset, options.visible_only) for record in records)
+        some = list(islice(chain.from_iterable(every), options.at_most))
+        learned = (rollout_errors(model, some), motionless_errors(some), rigid_errors(some))
+        replayed = (islice(replay_errors(solver, records), options.at_most) for solver in solvers.values())
+        means = [*(errors[:, -1].mean() for errors in learned), *(np.mean(list(errors)) for errors in replayed)]
+        table.add_row(category, str(len(some)), *(f"{1e3 * mean:.1f}" for mean in means))
     Console().print(table)
 
 

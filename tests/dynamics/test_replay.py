@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+
+from medor_cloth.dataset import Dataset
+from medor_cloth.garment import Garment
+from medor_cloth.goals import solver_of
+from medor_cloth.picker import pick_place
+from medor_dynamics.coarse import Coarse
+from medor_dynamics.evaluate import motionless_errors
+from medor_dynamics.node_mesh import NodeMesh
+from medor_dynamics.physics import Physics
+from medor_dynamics.preset import CPU
+from medor_dynamics.replay import replay_errors
+from medor_dynamics.samples import recordings
+
+
+@pytest.fixture
+def recorded(tmp_path, sheet, write_shard) -> Dataset:
+    """The corner of a sheet pulled over the rest of it."""
+    mesh = sheet(side=0.15, panels=True)
+    solver = solver_of(Garment("tshirt", 1, mesh.vertices, mesh.faces, mesh.panel_uv))
+    pick = mesh.vertices[0] + np.array([0, 0, 0.01], np.float32)
+    move = np.stack([pick, pick + np.array([0.12, 0.1, 0.05], np.float32)])
+    frames = pick_place(solver, solver.rest(mesh.vertices), *move, record_every=5).frames
+    frames = np.concatenate([mesh.vertices[None], frames, np.repeat(frames[-1:], 16, axis=0)])[:17]
+    write_shard(tmp_path, mesh, frames, move, NodeMesh.of(mesh))
+    return Dataset(tmp_path)
+
+
+def test_the_solver_that_recorded_a_pull_repeats_it(recorded):
+    assert list(replay_errors(Physics(1), recorded.garments)) == [pytest.approx(0, abs=2e-3)]
+
+
+def test_the_coarse_cloth_is_off_but_foresees_more_than_nothing(recorded):
+    (rough,) = replay_errors(Coarse(1), recorded.garments)
+    assert 0 < rough < 0.5 * motionless_errors(recordings(recorded, CPU))[0, -1]
