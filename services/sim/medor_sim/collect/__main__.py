@@ -5,6 +5,7 @@ import re
 import resource
 import signal
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -24,68 +25,59 @@ from medor_wire.messages import Category
 CONSOLE = Console(stderr=True)
 
 
-def recon(
-    category: Category,
-    n: int,
-    out: Path,
-    shard: str = "0/1",
-    seed: int = 0,
-    split: Literal["train", "test"] = "train",
-    per_garment: int = 10,
-    edge_m: float = 0.012,
-    winding: int = 64,
-    workers: int = 0,
-    preview: bool = False,
-) -> None:
+@dataclass(frozen=True)
+class Options:
+    """What is collected of either kind, and where to."""
+
+    category: Category
+    """of the garments."""
+    n: int
+    """trajectories over all shards."""
+    out: Path
+    """folder of the data set."""
+    shard: str = "0/1"
+    """i/N, one of 0/N … N-1/N; the data does not depend on N."""
+    seed: int = 0
+    """another one gives other garments and other chances."""
+    split: Literal["train", "test"] = "train"
+    """garments for training (seeds below 800000) or for tests (800000 to 899999)."""
+    per_garment: int = 10
+    """trajectories of each garment; of pulls, two from each start state."""
+    edge_m: float = 0.012
+    """mean edge length of the meshes [m]."""
+    workers: int = 0
+    """processes; 0 means one per core."""
+    preview: bool = False
+    """write a picture of some trajectories beside the shard."""
+
+    def plan(self, kind: Literal["recon", "dynamics"], winding: int = 0) -> Plan:
+        return Plan(kind, self.category, self.n, self.seed, self.split, self.per_garment, self.edge_m, winding)
+
+
+Unprefixed = Annotated[Options, tyro.conf.arg(name="")]
+
+
+def recon(options: Unprefixed, winding: int = 64) -> None:
     """Trajectories of five observations of a garment that is picked at.
 
     The same command goes on where it was stopped.
 
     Args:
-        category: of the garments.
-        n: trajectories over all shards, five observations each.
-        out: folder of the data set.
-        shard: i/N, one of 0/N … N-1/N; the data does not depend on N.
-        seed: another one gives other garments and other chances.
-        split: garments for training (seeds below 800000) or for tests (800000 to 899999).
-        per_garment: trajectories of each garment.
-        edge_m: mean edge length of the meshes [m].
+        options: what is collected.
         winding: nodes along each side of the winding-number grids; 0 stores none.
-        workers: processes; 0 means one per core.
-        preview: write a picture of some trajectories beside the shard.
     """
-    _collect(Plan("recon", category, n, seed, split, per_garment, edge_m, winding), out, shard, workers, preview)
+    collect(options.plan("recon", winding), options)
 
 
-def dynamics(
-    category: Category,
-    n: int,
-    out: Path,
-    shard: str = "0/1",
-    seed: int = 0,
-    split: Literal["train", "test"] = "train",
-    per_garment: int = 10,
-    edge_m: float = 0.012,
-    workers: int = 0,
-    preview: bool = False,
-) -> None:
+def dynamics(options: Unprefixed) -> None:
     """Trajectories of one pull and the fall after it, every fifth frame.
 
     The same command goes on where it was stopped.
 
     Args:
-        category: of the garments.
-        n: trajectories over all shards.
-        out: folder of the data set.
-        shard: i/N, one of 0/N … N-1/N; the data does not depend on N.
-        seed: another one gives other garments and other chances.
-        split: garments for training (seeds below 800000) or for tests (800000 to 899999).
-        per_garment: trajectories of each garment, two from each start state.
-        edge_m: mean edge length of the meshes [m].
-        workers: processes; 0 means one per core.
-        preview: write a picture of some trajectories beside the shard.
+        options: what is collected.
     """
-    _collect(Plan("dynamics", category, n, seed, split, per_garment, edge_m), out, shard, workers, preview)
+    collect(options.plan("dynamics"), options)
 
 
 def export(
@@ -118,17 +110,17 @@ def preview(folder: tyro.conf.Positional[Path], out: Path, trajectories: int = 4
     write_contact_sheet(folder, out, trajectories)
 
 
-def _collect(plan: Plan, out: Path, shard: str, workers: int, preview: bool) -> None:
-    mine = Shard(plan, *parse_shard(shard), out)
+def collect(plan: Plan, options: Options) -> None:
+    mine = Shard(plan, *parse_shard(options.shard), options.out)
     with mine.opened():
         with CollectionProgress(mine.total, mine.found, CONSOLE) as progress:
-            cores = workers or len(os.sched_getaffinity(0))
+            cores = options.workers or len(os.sched_getaffinity(0))
             collect_in_processes(mine, mine.garments, cores, progress.written_one)
         spent = resource.getrusage(resource.RUSAGE_CHILDREN)
         hours = (spent.ru_utime + spent.ru_stime) / 3600
         CONSOLE.print(f"{progress.written} written in {hours:.3f} CPU-hours: {progress.written / hours:.0f} an hour")
         CONSOLE.print(f"{len(Dataset(mine.path))} trajectories in {mine.path}", soft_wrap=True)
-    if preview:
+    if options.preview:
         write_contact_sheet(mine.path, mine.path.with_suffix(".png"))
 
 
