@@ -18,6 +18,7 @@ from medor_cloth.rollout import rollouts
 from medor_cloth.solver import Solver, SolverConfig
 from medor_dynamics.node_mesh import NodeMesh
 from medor_dynamics.on_nodes import OnNodes
+from medor_dynamics.physics import without_layers
 from medor_dynamics.rollout import Pulls
 from medor_wire.bus import Call
 from medor_wire.errors import BadRequest
@@ -54,7 +55,7 @@ class Coarse(OnNodes):
 
 def rough(config: SolverConfig) -> SolverConfig:
     """The same cloth in fewer, larger steps, its layers passing through each other."""
-    return replace(config, substeps=SUBSTEPS, spring_passes=SPRING_PASSES, layers=False)
+    return replace(without_layers(config), substeps=SUBSTEPS, spring_passes=SPRING_PASSES)
 
 
 def solver_of(nodes: NodeMesh, config: SolverConfig) -> Solver:

@@ -17,7 +17,7 @@ from medor_cloth.dataset import Dataset, GarmentRecord
 from medor_cloth.solver import SolverConfig
 from medor_dynamics.coarse import Coarse
 from medor_dynamics.model import Dynamics, Predictor
-from medor_dynamics.physics import Physics
+from medor_dynamics.physics import Physics, without_layers
 from medor_dynamics.preset import PULL_STEPS, STEPS
 from medor_dynamics.replay import replay_errors
 from medor_dynamics.samples import Recording, recordings_of, stretches
@@ -87,7 +87,7 @@ class Options:
 def main(options: Options) -> None:
     torch.set_num_threads(1)
     model, dataset = load(options.weights), Dataset(options.test)
-    rough = SolverConfig(layers=False)
+    rough = without_layers(SolverConfig())
     solvers = {"whole": Physics(1), "without layers": Physics(1, config=rough), "coarse": Coarse(1)}
     table = Table("category", "pulls", "model", "no motion", "rigid", *(f"solver, {name}" for name in solvers))
     table.title = "mean error of the nodes after 16 steps [mm]"

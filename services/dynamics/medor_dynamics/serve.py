@@ -4,7 +4,6 @@ Stateless: any number of replicas share the candidates of one plan.
 """
 
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -15,7 +14,7 @@ from medor_cloth.solver import SolverConfig
 from medor_dynamics.coarse import Coarse
 from medor_dynamics.flatten import Flattener
 from medor_dynamics.learned import learned
-from medor_dynamics.physics import Physics
+from medor_dynamics.physics import Physics, without_layers
 from medor_dynamics.roller import Roller
 from medor_dynamics.shipped import DEFAULT
 from medor_dynamics.warm_up import warm_up
@@ -47,7 +46,7 @@ def main(config: Config) -> None:
     roller = Roller(
         {
             "physics": Physics(threads, config=cloth),
-            "layerless": Physics(threads, config=replace(cloth, layers=False)),
+            "layerless": Physics(threads, config=without_layers(cloth)),
             "learned": learned(config.weights, threads, precision),
             "coarse": Coarse(threads, config=cloth),
         }

@@ -21,7 +21,7 @@ from rich.status import Status
 from medor_cloth.camera import Camera
 from medor_gateway.http_models import Candidate, EpisodeState, Observation, PickDetail, PickReport
 from medor_gateway.report import Arrow, Report, Step, page
-from medor_wire.messages import Category, DepthView, Task
+from medor_wire.messages import DEFAULT_METHOD, Category, DepthView, Task
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Options:
 
     url: str = "http://127.0.0.1:8080"
     """A running gateway."""
-    method: str = "visible"
+    method: str = DEFAULT_METHOD
     category: Category = "tshirt"
     task: Task = "flatten"
     seed: int = 1

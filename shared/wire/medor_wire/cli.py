@@ -13,7 +13,7 @@ from rich.console import Console
 from medor_wire import doctor as examination
 from medor_wire.compose import ComposeError
 from medor_wire.launcher import CellError, Launcher, heed_signals, is_free
-from medor_wire.messages import Category, Task
+from medor_wire.messages import DEFAULT_METHOD, Category, Task
 
 ROUTER_PORT = 7447
 """Where a cell is looked for when nobody says otherwise."""
@@ -37,7 +37,7 @@ def up(profile: Literal["sim", "robot"] = "sim", port: int = 8080, router_port: 
 
 
 def demo(
-    method: str = "visible",
+    method: str = DEFAULT_METHOD,
     category: Category = "tshirt",
     task: Task = "flatten",
     seed: int = 1,
@@ -51,7 +51,7 @@ def demo(
     """Crumple a garment in a simulated cell and unfold it; writes episode.json and report.html.
 
     Args:
-        method: how the planner sees and foresees: visible, oracle or random.
+        method: how the planner sees and foresees: medor+physics, visible, oracle, random or a row of the paper's table.
         category: of the garment.
         task: lay it flat anyhow, or into its canonical pose.
         seed: of the garment, the crumpling and the planning.

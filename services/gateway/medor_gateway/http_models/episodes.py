@@ -21,6 +21,7 @@ from medor_gateway.http_models.planning import Exhaustive, PlanResult, Progress
 from medor_gateway.jobs import Status
 from medor_gateway.problem import Problem
 from medor_wire.messages import (
+    DEFAULT_METHOD,
     Category,
     EpisodePick,
     EpisodeRequest,
@@ -41,7 +42,7 @@ class EpisodeCommand(Command):
 
     category: Category = "tshirt"
     task: Task = "flatten"
-    method: MethodName = "visible"
+    method: MethodName = DEFAULT_METHOD
     max_picks: Annotated[int, Field(ge=1, le=100)] = 10
     garment_seed: Seed | None = None
     garment_id: Annotated[Text, Field(max_length=128, description="Goes before `garment_seed`.")] | None = None
@@ -50,7 +51,7 @@ class EpisodeCommand(Command):
     options: EpisodeOptions = EpisodeOptions()
 
     model_config = example(
-        category="tshirt", task="flatten", method="visible", max_picks=10, garment_seed=1, state="drop", seed=0
+        category="tshirt", task="flatten", method=DEFAULT_METHOD, max_picks=10, garment_seed=1, state="drop", seed=0
     )
 
     def message(self) -> EpisodeRequest:

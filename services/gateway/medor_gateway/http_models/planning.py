@@ -9,6 +9,7 @@ from medor_gateway.http_models.observation import Observation
 from medor_gateway.jobs import Status
 from medor_gateway.problem import Problem
 from medor_wire.messages import (
+    DEFAULT_METHOD,
     ActOutcome,
     Category,
     Plan,
@@ -16,7 +17,7 @@ from medor_wire.messages import (
     Task,
 )
 
-Exhaustive = Annotated[bool, Field(description="Leave none to a smaller model: roll every candidate out.")]
+Exhaustive = Annotated[bool, Field(description="Leave none to a rougher model: roll every candidate out.")]
 
 
 class PlanOptions(Command):
@@ -31,11 +32,13 @@ class PlanCommand(Command):
 
     category: Category
     task: Task = "flatten"
-    method: MethodName = "visible"
+    method: MethodName = DEFAULT_METHOD
     observation: Annotated[Observation | None, Field(description="Absent: the cell's camera is asked.")] = None
     options: PlanOptions = PlanOptions()
 
-    model_config = example(category="tshirt", task="flatten", method="visible", options={"candidates": 100, "seed": 0})
+    model_config = example(
+        category="tshirt", task="flatten", method=DEFAULT_METHOD, options={"candidates": 100, "seed": 0}
+    )
 
     def message(self) -> PlanRequest:
         return PlanRequest(

@@ -41,6 +41,7 @@ from medor_wire.messages.cloth import (
 )
 from medor_wire.messages.infrastructure import Heartbeat
 from medor_wire.messages.planning import (
+    DEFAULT_METHOD,
     Episode,
     EpisodePick,
     EpisodeProgress,
@@ -54,6 +55,7 @@ from medor_wire.messages.simulated import GarmentId, ResetRequest, Score, Truth,
 from medor_wire.messages.view import CameraInfo, DepthView
 
 __all__ = [
+    "DEFAULT_METHOD",
     "F4",
     "F8",
     "I4",

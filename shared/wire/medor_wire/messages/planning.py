@@ -10,11 +10,14 @@ from medor_wire.messages.cloth import ClothMesh
 from medor_wire.messages.simulated import ResetRequest
 from medor_wire.messages.view import DepthView
 
+DEFAULT_METHOD = "medor+physics"
+"""How to see and foresee where nothing else is asked for."""
+
 
 class PlanRequest(Message):
     category: Category
     task: Task = "flatten"
-    method: str = "visible"
+    method: str = DEFAULT_METHOD
     view: DepthView | None = None
     """Absent: the cell is asked for one."""
     candidates: int = Field(default=100, ge=1, le=5000)
@@ -64,7 +67,7 @@ class ExecuteRequest(Message):
 class EpisodeRequest(Message):
     category: Category = "tshirt"
     task: Task = "flatten"
-    method: str = "visible"
+    method: str = DEFAULT_METHOD
     max_picks: int = Field(default=10, ge=1, le=100)
     candidates: int = Field(default=100, ge=1, le=5000)
     seed: int = Field(default=0, ge=0, lt=2**31)
