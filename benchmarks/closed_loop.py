@@ -98,6 +98,8 @@ class ClosedLoop:
             "ni": step.ni,
             "coverage_m2": step.coverage_m2,
             "no_op": step.no_op,
+            "reward": step.reward,
+            "no_op_reward": step.no_op_reward,
             "seconds": seconds,
             "timings_ms": step.timings_ms,
             "commit": self._commit,

@@ -52,6 +52,23 @@ def test_a_piece_smaller_than_a_node_stays_with_its_node(sheet, request_for):
     np.testing.assert_allclose(piece - piece[0], lone - lone[0], atol=1e-3)
 
 
+def test_nodes_in_a_row_are_no_cloth_but_stop_nothing(sheet, request_for):
+    """A strip whose far end is one node wide: clustering leaves faces without area there."""
+    low = sheet(side=0.1)
+    row = np.array([[0.06 + 0.03 * i, 0.0, 0.0025] for i in range(4)], np.float32)
+    nearest = int(np.linalg.norm(low.vertices - row[0], axis=1).argmin())
+    ends = [nearest, *range(len(low.vertices), len(low.vertices) + 4)]
+    mesh = ClothMesh(
+        vertices=np.concatenate([low.vertices, row]),
+        faces=np.concatenate([low.faces, np.array([ends[i : i + 3] for i in (1, 2)], np.int32)]),
+        category="tshirt",
+        visible=np.ones(len(low.vertices) + 4, bool),
+    )
+    pick = low.vertices[:1] + ABOVE
+    rolled = Coarse(threads=1).roll_out(request_for(mesh, pick, pick + np.array([[0.05, 0.05, 0.03]])), Call())
+    assert rolled.rewards[0] > -DIVERGED_PENALTY / 2
+
+
 def test_a_mesh_that_is_one_node_is_refused(sheet, request_for):
     corner = sheet(side=0.012)
     speck = corner.model_copy(update={"vertices": corner.vertices + np.float32(0.01)})

@@ -25,6 +25,8 @@ from medor_wire.errors import BadRequest
 
 SUBSTEPS = 3
 SPRING_PASSES = 2
+LEAST_AREA_M2 = 1e-6
+"""Of a coarse face: about a five-hundredth of what is usual [m²]."""
 
 
 class Coarse(OnNodes):
@@ -59,8 +61,11 @@ def rough(config: SolverConfig) -> SolverConfig:
 
 
 def solver_of(nodes: NodeMesh, config: SolverConfig) -> Solver:
-    """The solver of a coarse mesh, at rest as it is worn."""
+    """The solver of a coarse mesh, at rest as it is worn; faces that clustering left without area are no cloth."""
+    worn = nodes.rest_shape[nodes.ids]
+    first, second, third = worn[nodes.faces].swapaxes(0, 1).astype(np.float64)
+    areas = np.linalg.norm(np.cross(second - first, third - first), axis=1) / 2
     try:
-        return Solver(Cloth.from_mesh(nodes.rest_shape[nodes.ids], nodes.faces), config)
+        return Solver(Cloth.from_mesh(worn, nodes.faces[areas > LEAST_AREA_M2]), config)
     except ClothError as error:
         raise BadRequest(f"the coarse mesh cannot be cloth: {error}") from error
