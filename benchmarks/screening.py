@@ -22,6 +22,7 @@ from medor_wire.bus import Bus
 from medor_wire.errors import BadRequest
 from medor_wire.launcher import Launcher, heed_signals
 from medor_wire.messages import (
+    DEFAULT_METHOD,
     Category,
     ClothMesh,
     Empty,
@@ -46,7 +47,7 @@ ROUNDS = 2000
 class Options:
     """What to measure."""
 
-    method: str = "medor+physics"
+    method: str = DEFAULT_METHOD
     keep: tuple[float, ...] = (0.05, 0.1, 0.15, 0.2, 0.3, 0.5)
     """Shares of survivors."""
     candidates: int = 500

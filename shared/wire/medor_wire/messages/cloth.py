@@ -38,7 +38,7 @@ class ClothMesh(Message):
 class ReconstructRequest(Message):
     view: DepthView
     category: Category
-    method: str = "medor"
+    method: str = "isometric"
 
 
 class Reconstruction(Message):
