@@ -3,7 +3,8 @@ import pytest
 from scipy.stats import spearmanr
 
 from medor_dynamics.coarse import Coarse
-from medor_dynamics.physics import DIVERGED_PENALTY, Physics
+from medor_dynamics.physics import Physics
+from medor_dynamics.rewards import DIVERGED_PENALTY
 from medor_wire.bus import Call
 from medor_wire.errors import BadRequest
 from medor_wire.messages import ClothMesh

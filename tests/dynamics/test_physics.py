@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from medor_cloth.coverage import coverage
-from medor_dynamics.physics import DIVERGED_PENALTY, Physics
+from medor_dynamics.physics import Physics
+from medor_dynamics.rewards import DIVERGED_PENALTY
 from medor_wire.bus import Call
 from medor_wire.errors import BadRequest, Cancelled
 from medor_wire.messages import ClothMesh, Message, Reward, RolloutProgress

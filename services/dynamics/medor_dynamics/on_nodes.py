@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from medor_cloth.errors import ClothError
 from medor_cloth.grasp import grasp
 from medor_dynamics.node_mesh import NodeMesh
-from medor_dynamics.physics import DIVERGED_PENALTY
-from medor_dynamics.rewards import rewards
+from medor_dynamics.rewards import rated
 from medor_dynamics.rollout import Pulls
 from medor_wire.bus import Call
 from medor_wire.content import ByContent
@@ -51,13 +50,7 @@ class OnNodes(ABC):
         grasping = np.flatnonzero(held >= 0)
         positions[grasping] = self._follow(nodes, request, held, grasping, call)
         diverged = ~(np.abs(positions) < LEFT_M).reshape(total, -1).all(axis=1)
-        positions[diverged] = mesh.vertices
-        scores = rewards(positions, mesh, request.reward, threads=self._threads)
-        return Rollouts(
-            positions=positions,
-            rewards=scores - DIVERGED_PENALTY * diverged,
-            seconds=time.perf_counter() - started,
-        )
+        return rated(request, positions, diverged, threads=self._threads, started=started)
 
     def _follow(
         self, nodes: NodeMesh, request: RolloutRequest, held: NDArray[np.int64], grasping: NDArray[np.int64], call: Call

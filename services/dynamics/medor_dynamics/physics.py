@@ -16,14 +16,11 @@ from medor_cloth.errors import ClothError
 from medor_cloth.rollout import Cancelled as Stopped
 from medor_cloth.rollout import rollouts
 from medor_cloth.solver import Solver, SolverConfig
-from medor_dynamics.rewards import rewards
+from medor_dynamics.rewards import rated
 from medor_wire.bus import Call
 from medor_wire.content import ByContent
 from medor_wire.errors import BadRequest
 from medor_wire.messages import ClothMesh, RolloutProgress, RolloutRequest, Rollouts
-
-DIVERGED_PENALTY = 1e6
-"""Taken off the reward of the unmoved cloth when a rollout left the finite numbers: never chosen, still comparable."""
 
 
 def without_layers(config: SolverConfig) -> SolverConfig:
@@ -62,13 +59,7 @@ class Physics:
             call.check()
             raise
         diverged = ~np.isfinite(positions).reshape(total, -1).all(axis=1)
-        positions[diverged] = mesh.vertices
-        scores = rewards(positions, mesh, request.reward, threads=self._threads)
-        return Rollouts(
-            positions=positions,
-            rewards=scores - DIVERGED_PENALTY * diverged,
-            seconds=time.perf_counter() - started,
-        )
+        return rated(request, positions, diverged, threads=self._threads, started=started)
 
 
 def by_rest_shape(mesh: ClothMesh) -> ByContent[ClothMesh]:

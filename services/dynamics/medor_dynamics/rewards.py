@@ -1,5 +1,6 @@
 """Rewards of final states: coverage, or closeness to the canonical goals (MEDOR, section IV-C)."""
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -8,7 +9,39 @@ from numpy.typing import NDArray
 from medor_cloth.alignment import canonical_cost, canonical_cost_unmatched
 from medor_cloth.coverage import coverages
 from medor_wire.errors import BadRequest
-from medor_wire.messages import ClothMesh, Reward
+from medor_wire.messages import ClothMesh, Reward, RolloutRequest, Rollouts
+
+DIVERGED_PENALTY = 1e6
+"""Taken off the reward of the unmoved cloth when a rollout left the finite numbers: never chosen, still comparable."""
+
+
+def rated(
+    request: RolloutRequest,
+    positions: NDArray[np.float32],
+    diverged: NDArray[np.bool_],
+    *,
+    threads: int,
+    started: float,
+) -> Rollouts:
+    """Final states with their rewards. Diverged ones are put back to where the cloth was; in place.
+
+    Args:
+        request: what was rolled out.
+        positions: (K, V, 3) final states, task space [m].
+        diverged: (K,) those that mean nothing.
+        threads: how many to use.
+        started: reading of `time.perf_counter` when the request came.
+
+    Raises:
+        BadRequest: see `rewards`.
+    """
+    positions[diverged] = request.mesh.vertices
+    scores = rewards(positions, request.mesh, request.reward, threads=threads)
+    return Rollouts(
+        positions=positions,
+        rewards=scores - DIVERGED_PENALTY * diverged,
+        seconds=time.perf_counter() - started,
+    )
 
 
 def rewards(positions: NDArray[np.float32], mesh: ClothMesh, reward: Reward, *, threads: int) -> NDArray[np.float64]:
