@@ -10,7 +10,7 @@ from medor_cloth.garment import CATEGORIES, Garment, generate
 from medor_cloth.goals import solver_of
 from medor_cloth.raster import rasterize
 from medor_cloth.start import dropped
-from medor_recon.networks import SHIPPED, Networks
+from medor_recon.networks import SHIPPED
 from medor_recon.reconstructor import Reconstructor
 from medor_wire.messages import CameraInfo, ClothMesh, DepthView, ReconstructRequest
 

@@ -25,10 +25,11 @@ class Networks:
     Args:
         root: holds one folder a network, named `<part>-<preset>-<category>`, or `<part>-<preset>` for all categories.
         device: where to run them.
+        threads: of the CPU, for all of torch in this process once a network is loaded; None leaves that as it is.
     """
 
-    def __init__(self, root: Path = SHIPPED, device: str = "cpu") -> None:
-        self.root, self.device = root, device
+    def __init__(self, root: Path = SHIPPED, device: str = "cpu", threads: int | None = None) -> None:
+        self.root, self.device, self.threads = root, device, threads
         self._canonicalizer = cache(self._load_canonicalizer)
         self._completion = cache(self._load_completion)
 
@@ -56,8 +57,12 @@ class Networks:
         )
 
     def _load_canonicalizer(self, folder: Path) -> Canonicalizer:
+        import torch
+
         from medor_recon.canonical.canonicalizer import Canonicalizer
 
+        if self.threads is not None:
+            torch.set_num_threads(self.threads)
         return Canonicalizer.load(folder, self.device)
 
     def _load_completion(self, folder: Path) -> Completion:
