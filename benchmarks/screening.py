@@ -84,13 +84,14 @@ def main(options: Options) -> None:
 
 
 def decisions(bus: Bus, options: Options) -> Iterator[tuple[str, Decision]]:
+    rng = np.random.default_rng(0)
     for state in range(options.states):
         for category in options.categories:
             reset(bus, category, state)
             for pick in range(options.picks):
                 plans = [exhaustive(bus, options, category, task, seed=pick) for task in options.tasks]
                 for plan in plans:
-                    yield f"{category} {state}, pick {pick + 1}, {plan.task}", decided(bus, options, plan)
+                    yield f"{category} {state}, pick {pick + 1}, {plan.task}", decided(bus, options, plan, rng)
                 bus.ask(endpoints.EXECUTE, ExecuteRequest(plan_id=plans[0].plan_id))
 
 
@@ -108,9 +109,9 @@ def exhaustive(bus: Bus, options: Options, category: Category, task: Task, seed:
     return bus.ask(endpoints.PLAN, asked.model_copy(update={"exhaustive": True, "report": options.candidates}))
 
 
-def decided(bus: Bus, options: Options, plan: Plan) -> Decision:
+def decided(bus: Bus, options: Options, plan: Plan, rng: np.random.Generator) -> Decision:
     rated = rolled_out(bus, plan.mesh, plan.task, plan.top_picks, plan.top_places, "coarse")
-    chance = np.random.default_rng(0).random(len(rated.rewards))
+    chance = rng.random(len(rated.rewards))
     every = {
         chosen(plan.top_rewards, rating, plan.no_op_reward, keep)
         for rating in (rated.rewards, chance)
