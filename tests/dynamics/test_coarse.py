@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scipy.stats import spearmanr
+from scipy.stats import rankdata
 
 from medor_dynamics.coarse import Coarse
 from medor_dynamics.physics import Physics
@@ -25,7 +25,7 @@ def test_it_ranks_pulls_as_the_cloth_solver_does(sheet, request_for):
     mesh = sheet(side=0.2)
     asked = request_for(mesh, *pulls_at_random(mesh, 40))
     rough, exact = (backend(threads=2).roll_out(asked, Call()).rewards for backend in (Coarse, Physics))
-    assert spearmanr(rough, exact).statistic > 0.8
+    assert np.corrcoef(rankdata(rough), rankdata(exact))[0, 1] > 0.8, "Spearman correlation"
 
 
 def test_a_rollout_depends_neither_on_threads_nor_on_the_other_candidates(sheet, request_for):

@@ -8,11 +8,9 @@ from medor_wire.messages import ReconstructRequest
 
 def test_a_warmed_up_service_has_its_networks_loaded():
     networks = Networks()
-    loads: list[str] = []
-    load = networks._load_canonicalizer
-    networks._canonicalizer = lambda folder: loads.append(folder.name) or load(folder)
     warm_up(Reconstructor(networks=networks))
-    assert loads == ["canonical-cpu-tshirt"]
+    assert networks._canonicalizer.cache_info().currsize == 1
+    assert networks._completion.cache_info().currsize == 1
 
 
 def test_the_patch_is_a_garment_to_the_service():

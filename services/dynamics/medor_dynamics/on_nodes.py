@@ -49,7 +49,7 @@ class OnNodes(ABC):
         positions = np.repeat(mesh.vertices[None], total, axis=0)
         grasping = np.flatnonzero(held >= 0)
         positions[grasping] = self._follow(nodes, request, held, grasping, call)
-        diverged = ~(np.abs(positions) < LEFT_M).reshape(total, -1).all(axis=1)
+        diverged = np.any(~(np.abs(positions.reshape(total, -1)) < LEFT_M), axis=1)
         return rated(request, positions, diverged, threads=self._threads, started=started)
 
     def _follow(

@@ -58,7 +58,7 @@ class Physics:
         except Stopped:
             call.check()
             raise
-        diverged = ~np.isfinite(positions).reshape(total, -1).all(axis=1)
+        diverged = np.any(~np.isfinite(positions.reshape(total, -1)), axis=1)
         return rated(request, positions, diverged, threads=self._threads, started=started)
 
 

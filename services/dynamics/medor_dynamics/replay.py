@@ -1,13 +1,14 @@
 """Recorded pulls done again by a backend: how far from the recording do they end?"""
 
 from collections.abc import Iterable, Iterator
+from typing import cast
 
 import numpy as np
 
 from medor_cloth.dataset import GarmentRecord, Trajectory
 from medor_dynamics.roller import Backend
 from medor_wire.bus import Call
-from medor_wire.messages import ClothMesh, Reward, RolloutRequest
+from medor_wire.messages import Category, ClothMesh, Reward, RolloutRequest
 
 
 def replay_errors(backend: Backend, records: Iterable[GarmentRecord]) -> Iterator[float]:
@@ -26,7 +27,7 @@ def request_of(trajectory: Trajectory) -> RolloutRequest:
     mesh = ClothMesh(
         vertices=start,
         faces=garment["faces"],
-        category=garment.category,
+        category=cast(Category, garment.category),
         visible=np.ones(len(start), bool),
         canonical=garment["vertices"],
         panel_uv=garment["panel_uv"],
