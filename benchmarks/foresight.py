@@ -38,12 +38,12 @@ def table(found: dict[str, NDArray[np.float64]]) -> Table:
     out = Table("method", "pulls", "foreseen", "actual", "better than before", "correlation")
     for method, pairs in found.items():
         correlation = np.corrcoef(pairs.T)[0, 1] if len(pairs) > 1 else np.nan
-        for number, part in enumerate(np.array_split(pairs[pairs[:, 0].argsort()], QUARTERS)):
-            if len(part):
-                means = (f"{mean:+.1%}" for mean in part.mean(axis=0))
-                better = f"{(part[:, 1] > 0).mean():.0%}"
+        for number, which in enumerate(np.array_split(pairs[:, 0].argsort(), QUARTERS)):
+            if len(which):
+                foreseen, actual = pairs[which].T
                 head = (method, f"{correlation:.2f}") if number == 0 else ("", "")
-                out.add_row(head[0], str(len(part)), *means, better, head[1])
+                means = (f"{foreseen.mean():+.1%}", f"{actual.mean():+.1%}", f"{np.mean(actual > 0):.0%}")
+                out.add_row(head[0], str(len(which)), *means, head[1])
     return out
 
 
