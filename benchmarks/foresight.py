@@ -37,10 +37,10 @@ def table(found: dict[str, NDArray[np.float64]]) -> Table:
     """A row for each quarter of a method's pulls, by what was foreseen."""
     out = Table("method", "pulls", "foreseen", "actual", "better than before", "correlation")
     for method, pairs in found.items():
-        correlation = np.corrcoef(pairs.T)[0, 1] if len(pairs) > 1 else np.nan
+        correlation = np.corrcoef(pairs[:, 0], pairs[:, 1])[0, 1] if len(pairs) > 1 else np.nan
         for number, which in enumerate(np.array_split(pairs[:, 0].argsort(), QUARTERS)):
             if len(which):
-                foreseen, actual = pairs[which].T
+                foreseen, actual = pairs[which, 0], pairs[which, 1]
                 head = (method, f"{correlation:.2f}") if number == 0 else ("", "")
                 means = (f"{foreseen.mean():+.1%}", f"{actual.mean():+.1%}", f"{np.mean(actual > 0):.0%}")
                 out.add_row(head[0], str(len(which)), *means, head[1])
