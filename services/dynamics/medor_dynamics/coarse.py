@@ -1,7 +1,7 @@
 """Backend `coarse`: candidates rolled out by the cloth solver on the coarse mesh, roughly and fast.
 
-A quarter of the vertices, a quarter of the substeps and no contact between layers: a fiftieth of the time of backend
-`physics`, and still a fair judge of which pulls are worth a closer look.
+A quarter of the vertices, a quarter of the substeps and no contact between layers: a fair judge of which pulls are
+worth a closer look (docs/decisions/0005-screening-by-a-coarse-cloth.md).
 """
 
 from collections.abc import Callable
