@@ -127,12 +127,6 @@ def test_where_the_screen_refuses_planning_is_exhaustive_and_says_so_once(lab, t
     assert sum("without screening" in record.getMessage() for record in caplog.records) == 1
 
 
-def test_the_cloth_solver_is_not_screened(lab, think):
-    _, screen = think(length, length)
-    assert lab.bus.ask(endpoints.PLAN, ASKED.model_copy(update={"method": "oracle"})).survivors == 200
-    assert not screen.asked
-
-
 def drawn(count: int) -> Candidates:
     picks = np.random.default_rng(0).uniform(size=(count, 3)).astype(np.float32)
     return Candidates(picks, picks)

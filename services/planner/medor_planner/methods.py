@@ -22,11 +22,6 @@ class Method:
     """Whether hidden cloth is rolled out but does not count."""
 
     @property
-    def screened(self) -> bool:
-        """Whether a rough model may choose what is rolled out."""
-        return self.dynamics in ("learned", "layerless")
-
-    @property
     def with_physics(self) -> "Method":
         """The same, rolled out by the cloth solver; completed layers run through each other, so it lets them."""
         return replace(self, name=f"{self.name}+physics", dynamics="layerless")

@@ -123,7 +123,7 @@ class Planner:
                 return Shooting(self._bus, asked, cancel, chunk).rewards(on_fraction=tell)
 
         drawn, screening = len(candidates), self._screening
-        if method.screened and not request.exhaustive and screening.leaves(drawn) < drawn:
+        if not request.exhaustive and screening.leaves(drawn) < drawn:
             candidates = screening.survivors(candidates, partial(rewards, "screen", chunk=SCREEN_CHUNK))
         found = rewards("rollout", no_op(mesh) + candidates, method.dynamics or "", self._chunk)
         return Choice(candidates, found[1:], float(found[0]), drawn)

@@ -1,7 +1,7 @@
 """Screening: a rough model rates all candidates, so that the method's own model need roll only the best ones out.
 
 What is left is chosen from by the method's own model, so screening can cost the best candidate but never mistake a bad
-one for it. Methods that plan with the whole cloth solver are not screened: they are what the others are measured by.
+one for it.
 """
 
 import logging
