@@ -5,7 +5,7 @@ import pytest
 
 from medor_cloth.coverage import coverage
 from medor_dynamics.physics import Physics
-from medor_dynamics.rewards import rewards, turned_over
+from medor_dynamics.rewards import rewards
 from medor_wire.bus import Call
 from medor_wire.errors import BadRequest
 from medor_wire.messages import ClothMesh, Reward
@@ -59,37 +59,6 @@ def test_cloth_that_nobody_saw_cannot_be_scored_by_what_was_seen(half_hidden):
     unseen = half_hidden.model_copy(update={"visible": np.zeros_like(half_hidden.visible)})
     with pytest.raises(BadRequest, match="visible"):
         rate(unseen, VISIBLE, unseen.vertices)
-
-
-def test_cloth_whose_side_is_uncertain_is_rated_against_both(sheet):
-    mesh, rng = sheet(), np.random.default_rng(0)
-    goal = mesh.vertices * np.array([1, 0.8, 1], np.float32) + rng.normal(0, 0.01, mesh.vertices.shape).astype(
-        np.float32
-    )
-    over = turned_over(goal)
-    states = mesh.vertices, goal, over
-    right, wrong = (np.array(rate(mesh, canonical(it), *states)) for it in (goal, over))
-    for probability in (0.5, 0.7, 1):
-        unsure = mesh.model_copy(update={"side_probability": probability})
-        expected = probability * right + (1 - probability) * wrong
-        assert rate(unsure, canonical(goal), *states) == pytest.approx(expected, abs=1e-7)
-    assert right[1] == pytest.approx(0, abs=1e-7)
-    assert wrong[1] < -0.01, "a garment on its other side is not the same"
-
-
-def test_turning_over_turns_a_garment_and_does_not_mirror_it(sheet):
-    """Twice is not at all; lengths stay; the lowest becomes the highest; what pointed up points down."""
-    mesh = sheet()
-    goal = mesh.vertices + np.random.default_rng(0).normal(0, 0.01, mesh.vertices.shape).astype(np.float32)
-    over = turned_over(goal)
-    np.testing.assert_allclose(turned_over(over), goal, atol=1e-6)
-    np.testing.assert_allclose(edges(over, mesh.faces), edges(goal, mesh.faces) * [-1, 1, -1], atol=1e-6)
-    assert (over[:, 2].argmin(), over[:, 2].argmax()) == (goal[:, 2].argmax(), goal[:, 2].argmin())
-    assert (over[:, 2].min(), over[:, 2].max()) == pytest.approx((goal[:, 2].min(), goal[:, 2].max()), abs=1e-6)
-
-
-def edges(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    return positions[faces[:, 1]] - positions[faces[:, 0]]
 
 
 def test_goals_are_counted_before_the_hidden_ones_are_left_out(half_hidden):

@@ -55,7 +55,7 @@ def rewards(positions: NDArray[np.float32], mesh: ClothMesh, reward: Reward, *, 
         threads: how many to use; the result does not depend on it.
 
     Returns:
-        (K,) coverage [m²], or minus the mean distance to the best goal [m]: the expected one when the side is uncertain.
+        (K,) coverage [m²], or minus the mean distance to the best goal [m].
 
     Raises:
         BadRequest: matched goals with another number of vertices than the mesh, or nothing that counts.
@@ -71,32 +71,6 @@ def rewards(positions: NDArray[np.float32], mesh: ClothMesh, reward: Reward, *, 
     if reward.matched:
         if goals.shape[1] != positions.shape[1]:
             raise BadRequest(f"expected goals of {positions.shape[1]} vertices like the mesh, got {goals.shape[1]}")
-        return -expected_cost(positions[:, counts], goals[:, counts], mesh.side_probability)
+        return -canonical_cost(positions[:, counts], goals[:, counts])
     with ThreadPoolExecutor(threads) as pool:
         return -np.array(list(pool.map(lambda state: canonical_cost_unmatched(state, goals), positions[:, counts])))
-
-
-def expected_cost(
-    positions: NDArray[np.float32], goals: NDArray[np.float32], side_probability: float
-) -> NDArray[np.float64]:
-    """Mean distance of the vertices to the best goal that is to be expected when the side up may be the other one.
-
-    Args:
-        positions: (K, V, 3) task space [m].
-        goals: (S, V, 3) should the side be right [m]; should it not, the same garments turned over.
-        side_probability: that it is.
-
-    Returns:
-        (K,) [m].
-    """
-    cost = canonical_cost(positions, goals)
-    if side_probability == 1:
-        return cost
-    return side_probability * cost + (1 - side_probability) * canonical_cost(positions, turned_over(goals))
-
-
-def turned_over(flat: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Flat garments (S, V, 3) turned half about their body axis, y: what was below lies on top."""
-    z = flat[..., 2]
-    both = z.min(-1, keepdims=True) + z.max(-1, keepdims=True)
-    return np.stack([-flat[..., 0], flat[..., 1], both - z], -1)

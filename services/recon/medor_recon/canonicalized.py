@@ -20,7 +20,6 @@ class Canonicalized:
         confidence: (P, 3) float32 probability of the chosen bin, per axis.
         features: (P, C) float32 of the network; C may be 0.
         camera: of the network's image.
-        side_probability: that the side up is the one `nocs` says, and not the other; 1 where both sides are alike.
     """
 
     category: str
@@ -30,4 +29,3 @@ class Canonicalized:
     confidence: NDArray[np.float32]
     features: NDArray[np.float32]
     camera: Camera
-    side_probability: float = 1.0

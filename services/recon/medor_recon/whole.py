@@ -97,7 +97,6 @@ def reconstruct(
         visible=refined.visible,
         canonical=completed.canonical.astype(np.float32),
         confidence=confidence(completed, seen),
-        side_probability=seen.side_probability,
     )
 
 

@@ -54,7 +54,6 @@ def mesh(side: int = 5) -> m.ClothMesh:
         canonical=canonical,
         panel_uv=vertices[faces][:, :, :2],
         confidence=np.full(len(vertices), 0.5, np.float32),
-        side_probability=0.75,
     )
 
 

@@ -79,11 +79,11 @@ def test_a_shirt_has_two_answers_half_a_turn_apart_and_a_skirt_one(boxes):
     depth, camera = overhead_view()
     canonicalizer = fresh(boxes, categories=("tshirt", "skirt"))
     first, second = canonicalizer.hypotheses("tshirt", depth, camera)
-    assert first.side_probability >= second.side_probability
-    assert first.side_probability + second.side_probability == pytest.approx(1)
-    np.testing.assert_allclose((first.nocs + second.nocs)[:, :2], 1, atol=1e-5)
-    np.testing.assert_allclose(first.nocs[:, 2], second.nocs[:, 2], atol=1e-6)
-    assert [one.side_probability for one in canonicalizer.hypotheses("skirt", depth, camera)] == [1.0]
+    assert first.probability >= second.probability
+    assert first.probability + second.probability == pytest.approx(1)
+    np.testing.assert_allclose((first.canonicalized.nocs + second.canonicalized.nocs)[:, :2], 1, atol=1e-5)
+    np.testing.assert_allclose(first.canonicalized.nocs[:, 2], second.canonicalized.nocs[:, 2], atol=1e-6)
+    assert [one.probability for one in canonicalizer.hypotheses("skirt", depth, camera)] == [1.0]
 
 
 def test_what_cannot_be_answered_is_said(boxes):

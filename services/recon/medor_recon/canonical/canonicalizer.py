@@ -23,10 +23,16 @@ from medor_recon.canonical.views import SIDE_PX
 from medor_recon.canonicalized import Canonicalized
 from medor_wire.errors import BadRequest, NoGarment
 
-SIDE_TEMPERATURE = 2.0
-"""Networks are this many times as sure of the side, in log odds, as they are right (100 views of held-out T-shirts)."""
 STRIDE = 32
 """Windows grow in these steps [px]; the coarsest features have this resolution."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One answer to which side of the garment is up."""
+
+    probability: float
+    canonicalized: Canonicalized
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +84,9 @@ class Canonicalizer:
             NoGarment: nothing is seen where the overhead camera looks.
             BadRequest: a category this network was not taught.
         """
-        return self.hypotheses(category, depth, camera)[0]
+        return self.hypotheses(category, depth, camera)[0].canonicalized
 
-    def hypotheses(self, category: str, depth: NDArray[np.float32], camera: Camera) -> list[Canonicalized]:
+    def hypotheses(self, category: str, depth: NDArray[np.float32], camera: Camera) -> list[Hypothesis]:
         """One answer for each side that the category can show, the likeliest first; see `canonicalize`."""
         if category not in self.categories:
             raise BadRequest(f"category: expected one of {', '.join(self.categories)}, got {category!r}")
@@ -88,18 +94,13 @@ class Canonicalizer:
         with torch.inference_mode():
             said = self._ask(view, category)
             nocs, confidence = (_numpy(part[0]) for part in decode(said.logits, self.decoding))
-            features, side = (
-                _numpy(said.features[0].float()),
-                _numpy((said.side[0].float() / SIDE_TEMPERATURE).softmax(-1)),
-            )
+            features, side = _numpy(said.features[0].float()), _numpy(said.side[0].float().softmax(-1))
         seen = Canonicalized(category, view.pixels, view.points, nocs, confidence, features, CAMERA)
         if sides(category) == 1:
-            return [seen]
-        answers = [
-            replace(seen, side_probability=float(side[0])),
-            replace(seen, side_probability=float(side[1]), nocs=turned_points(nocs, category, 1)),
-        ]
-        return sorted(answers, key=lambda answer: -answer.side_probability)
+            return [Hypothesis(1.0, seen)]
+        other = replace(seen, nocs=turned_points(nocs, category, 1))
+        answers = [Hypothesis(float(side[0]), seen), Hypothesis(float(side[1]), other)]
+        return sorted(answers, key=lambda answer: -answer.probability)
 
     def _view(self, depth: NDArray[np.float32], camera: Camera) -> _View:
         depth = overhead_depth(depth, camera)

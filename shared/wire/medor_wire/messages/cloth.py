@@ -2,7 +2,7 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from medor_wire.arrays import Shape
 from medor_wire.messages.base import F4, F8, I4, Bools, Category, Message, Task
@@ -24,9 +24,6 @@ class ClothMesh(Message):
     """Flat panel coordinates per face corner [m]: the rest shape. Absent: at rest in canonical space, or as it lies."""
     confidence: Annotated[F4, Shape("V", "f4")] | None = None
     """How sure reconstruction is of each vertex, from 0 to 1; where it is the truth, or all seen, there is none."""
-
-    side_probability: float = Field(default=1.0, ge=0, le=1)
-    """That the garment lies as `canonical` says, and not turned half about its body axis, the other side up."""
 
     @model_validator(mode="after")
     def _faces_in_range(self) -> Self:
