@@ -61,7 +61,7 @@ def test_neither_chunks_nor_threads_matter(cloth, model):
 
 def test_the_held_node_travels_the_pull_and_falls_no_further_without_acceleration(cloth, model):
     nodes, positions = cloth
-    still = model()
+    still = model(SMALL["paper"])
     still.normalizer.acceleration_scale.zero_()
     pulls = pulls_on(positions)
     after = roll_out(still.predictor(), nodes.graphs(positions, still.preset), positions, pulls)

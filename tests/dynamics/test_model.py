@@ -84,7 +84,7 @@ def test_the_held_node_moves_as_the_picker_whatever_the_network_says(crumpled, m
 
 
 def test_without_acceleration_nodes_keep_their_velocity(crumpled, model):
-    still = model()
+    still = model(PAPER)
     torch.nn.init.zeros_(still.network.decode[4].weight)
     torch.nn.init.zeros_(still.network.decode[4].bias)
     motion = moving(crumpled)

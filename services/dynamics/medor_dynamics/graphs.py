@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -54,6 +55,16 @@ class Graphs:
     mesh_senders: NDArray[np.int64]
     rest: Tensor
     graph_of: Tensor
+
+    @cached_property
+    def senders(self) -> Tensor:
+        """(M,) of the mesh edges, sorted by receiver."""
+        return torch.from_numpy(self.mesh_senders)
+
+    @cached_property
+    def receivers(self) -> Tensor:
+        """(M,) of the mesh edges."""
+        return torch.from_numpy(np.repeat(np.arange(self.starts[-1]), np.diff(self.mesh_starts)))
 
     @classmethod
     def of(cls, sizes: Sequence[int], edges: Sequence[NDArray], rest: Sequence[NDArray]) -> Self:

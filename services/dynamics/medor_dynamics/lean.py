@@ -73,6 +73,7 @@ class LeanBlock:
         self._second, self._third = weight_of(second, dtype), weight_of(third, dtype)
         self._first_bias = torch.from_numpy(bias_of(first)).to(dtype)
         self._second_bias, self._third_bias = bias_of(second), bias_of(third)
+        self._third_of_sums = self._third.float()
         self._node = cast(block.node, dtype)
         self._global = cast(block.shared, dtype) if block.shared is not None else None
 
@@ -95,9 +96,14 @@ class LeanBlock:
         add_ends_relu(raw(hidden), raw(received), raw(nodes @ self._sender), senders, receivers)
         torch.mm(hidden, self._second, out=other)
         add_bias_relu(raw(other), self._second_bias)
-        torch.mm(other, self._third, out=hidden)
         sums = torch.zeros(nodes.shape, dtype=torch.float32)
-        sum_into_receivers(raw(hidden), self._third_bias, raw(edges), receivers, sums.numpy(), update_edges)
+        if update_edges:
+            torch.mm(other, self._third, out=hidden)
+            sum_and_add(raw(hidden), self._third_bias, raw(edges), receivers, sums.numpy())
+        else:  # nobody asks what single edges become, and the last layer of a sum is the sum of last layers
+            sum_into_receivers(raw(other), receivers, sums.numpy())
+            received = torch.bincount(wiring.receivers, minlength=len(nodes))
+            sums = sums @ self._third_of_sums + received[:, None] * torch.from_numpy(self._third_bias)
         return self._nodes_and_shared(nodes, sums, shared, wiring)
 
     def _nodes_and_shared(self, nodes: Tensor, sums: Tensor, shared: Tensor, wiring: Wiring) -> tuple[Tensor, Tensor]:
@@ -183,12 +189,20 @@ def add_bias_relu(hidden, bias):
 
 
 @kernel
-def sum_into_receivers(out, bias, edges, receivers, sums, update_edges):
+def sum_and_add(out, bias, edges, receivers, sums):
     """Adds each edge's output, its bias added, to the edge and to its receiver's sum."""
     for edge in range(len(out)):
         receiver = receivers[edge]
         for c in range(out.shape[1]):
             value = _read(out[edge, c]) + bias[c]
             sums[receiver, c] += value
-            if update_edges:
-                edges[edge, c] = _stored_like(_read(edges[edge, c]) + value, edges[edge, c])
+            edges[edge, c] = _stored_like(_read(edges[edge, c]) + value, edges[edge, c])
+
+
+@kernel
+def sum_into_receivers(hidden, receivers, sums):
+    """Adds each edge's hidden values to its receiver's sum."""
+    for edge in range(len(hidden)):
+        receiver = receivers[edge]
+        for c in range(hidden.shape[1]):
+            sums[receiver, c] += _read(hidden[edge, c])

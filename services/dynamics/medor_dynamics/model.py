@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from medor_dynamics.graphs import Graphs, Wiring
 from medor_dynamics.lean import LeanNetwork
+from medor_dynamics.lengths import lengths_kept
 from medor_dynamics.network import GraphNetwork
 from medor_dynamics.normalizer import Normalizer
 from medor_dynamics.preset import HISTORY, STEP_S, Preset
@@ -82,7 +83,12 @@ class Predictor:
     def __call__(self, graphs: Graphs, motion: Motion, grip: Grip) -> Motion:
         """The nodes one step later. A held node moves exactly as its picker does."""
         moved = injected(motion, grip)
-        return integrated(moved, self.acceleration(graphs, moved, grip), grip)
+        after = integrated(moved, self.acceleration(graphs, moved, grip), grip)
+        if not self.preset.length_passes:
+            return after
+        kept = lengths_kept(graphs, after.positions, grip.nodes, self.preset.length_passes)
+        velocity = (kept - motion.positions) / STEP_S
+        return Motion(kept, torch.cat([velocity[:, None], after.velocities[:, 1:]], dim=1))
 
     def acceleration(self, graphs: Graphs, moved: Motion, grip: Grip) -> Tensor:
         """(N, 3) acceleration [m/s²] of nodes among which the held ones have been moved."""

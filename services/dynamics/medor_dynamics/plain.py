@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from medor_dynamics.lengths import OVER_RELAXATION
 from medor_dynamics.model import Dynamics
 from medor_dynamics.network import Block
 from medor_dynamics.preset import HISTORY, PULL_STEPS, STEP_S, STEPS, Preset
@@ -39,7 +40,11 @@ def roll_out_plainly(
         velocity = history[0] + STEP_S * accelerations(model, x, history, held, edges, rest)
         shifted = [velocity, *history[:-1]]
         history = [torch.where(held[:, None], old, new) for old, new in zip(history, shifted, strict=True)]
-        x = torch.where(held[:, None], x, x + STEP_S * velocity)
+        before, x = x, torch.where(held[:, None], x, x + STEP_S * velocity)
+        for _ in range(model.preset.length_passes):
+            x = x + OVER_RELAXATION * corrections(x, held, edges, rest)
+        if model.preset.length_passes:
+            history[0] = torch.where(held[:, None], history[0], (x - before) / STEP_S)
     return (x.numpy() @ to_model).astype(np.float32)
 
 
@@ -67,6 +72,19 @@ def accelerations(
         nodes_out, messages_out, shared_out = pass_messages(block, nodes, messages, shared, senders, receivers)
         nodes, messages, shared = nodes_in + nodes_out, messages + messages_out, shared + shared_out
     return network.decode(nodes_out) * norm.acceleration_scale
+
+
+def corrections(x: Tensor, held: Tensor, edges: NDArray[np.int32], rest: NDArray[np.float32]) -> Tensor:
+    """(n, 3) mean of what the edges at each node ask of it to have their rest lengths again [m]."""
+    sums, counts = torch.zeros_like(x), torch.zeros(len(x))
+    for (a, b), length in zip(edges.tolist(), rest, strict=True):
+        way = (x[b] - x[a]) * (1 - length / max((x[b] - x[a]).norm(), 1e-6))
+        free = [not held[a], not held[b]]
+        sums[a] += free[0] * way / max(sum(free), 1)
+        sums[b] -= free[1] * way / max(sum(free), 1)
+        counts[a] += 1
+        counts[b] += 1
+    return sums / counts.clamp(min=1)[:, None]
 
 
 def pass_messages(

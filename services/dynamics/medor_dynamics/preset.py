@@ -35,9 +35,20 @@ class Preset:
     """Axes the model thinks in: `pull` has x along the pull, so that a turned scene gives the turned rollout."""
     normalize: bool = False
     """Features and accelerations in units of their spread over the training data."""
+    length_passes: int = 0
+    """Passes by which mesh edges get their lengths back after every step, 0: they keep what the network gave them."""
 
 
 PAPER = Preset()
-CPU = Preset(width=64, blocks=5, global_vector=False, nearest=8, close_mesh_edges=False, frame="pull", normalize=True)
+CPU = Preset(
+    width=64,
+    blocks=5,
+    global_vector=False,
+    nearest=8,
+    close_mesh_edges=False,
+    frame="pull",
+    normalize=True,
+    length_passes=5,
+)
 """Small enough for 500 rollouts in seconds on two cores."""
 PRESETS = {"paper": PAPER, "cpu": CPU}

@@ -54,6 +54,8 @@ class Options:
     rest: Literal["start", "true"] | None = None
     frame: Literal["world", "pull"] | None = None
     normalize: bool | None = None
+    length_passes: int | None = None
+    """By which edges get their lengths back after every step, 0: none."""
     lr: float = 1e-3
     bf16: bool = True
     validate_every: int = 1000
@@ -102,7 +104,7 @@ def main(options: Options) -> None:
 
 def preset_of(options: Options) -> Preset:
     """The named preset with what was asked to be different."""
-    names = ("width", "blocks", "nearest", "rest", "frame", "normalize")
+    names = ("width", "blocks", "nearest", "rest", "frame", "normalize", "length_passes")
     asked = {name: value for name in names if (value := getattr(options, name)) is not None}
     return replace(PRESETS[options.preset], **asked)
 
