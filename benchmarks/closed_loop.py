@@ -14,9 +14,10 @@ from benchmarks.skips import Skips, told
 from medor_learn.revision import revision
 from medor_wire import endpoints
 from medor_wire.bus import Bus
-from medor_wire.errors import MedorError, NoGarment, OutOfReach, ReconstructionFailed, SeveralGarments
-from medor_wire.messages import Empty, EpisodePick, EpisodeProgress, Message
+from medor_wire.errors import Busy, MedorError, NoGarment, OutOfReach, ReconstructionFailed, SeveralGarments
+from medor_wire.messages import Empty, EpisodePick, EpisodeProgress, EpisodeRequest, Message
 
+ASK_AGAIN_S = 5.0
 GIVEN_UP = (NoGarment, OutOfReach, ReconstructionFailed, SeveralGarments)
 """What a method answers when it cannot go on. The episode counts with the NI it has reached."""
 
@@ -27,10 +28,11 @@ class ClosedLoop:
     Args:
         folder: where results are kept, and pictures.
         tell: told where the run stands, a line at a time.
+        patience_s: how long a busy cell is waited for [s].
     """
 
-    def __init__(self, bus: Bus, folder: Path, tell: Callable[[str], None]) -> None:
-        self._bus, self._folder, self._tell = bus, folder, tell
+    def __init__(self, bus: Bus, folder: Path, tell: Callable[[str], None], patience_s: float = 1200.0) -> None:
+        self._bus, self._folder, self._tell, self._patience_s = bus, folder, tell, patience_s
         self._commit = revision()
 
     def run(self, missing: Sequence[Trial], results: Results, skips: Skips) -> dict[str, str]:
@@ -75,7 +77,7 @@ class ClosedLoop:
 
         gave_up: dict[str, Any] = {}
         try:
-            self._bus.ask(endpoints.EPISODE, trial.request(), on_progress=report)
+            self._ask_when_free(trial.request(), report)
         except GIVEN_UP as error:
             if not steps:
                 raise
@@ -86,6 +88,18 @@ class ClosedLoop:
         lines = [self._line(trial, *one) for one in zip(steps, seconds, strict=True)]
         lines[-1] |= {"last": True, **gave_up}
         return lines
+
+    def _ask_when_free(self, request: EpisodeRequest, report: Callable[[Message], None]) -> None:
+        """Asks for an episode. A cell that lost its asker, as a busy machine may, first finishes the one before."""
+        until = time.monotonic() + self._patience_s
+        while True:
+            try:
+                self._bus.ask(endpoints.EPISODE, request, on_progress=report)
+                return
+            except Busy:
+                if time.monotonic() >= until:
+                    raise
+                time.sleep(min(ASK_AGAIN_S, self._patience_s))
 
     def _line(self, trial: Trial, step: EpisodePick, seconds: float) -> Line:
         return {

@@ -15,7 +15,7 @@ from benchmarks.skips import Skips
 from medor_cloth.camera import overhead
 from medor_wire import endpoints
 from medor_wire.bus import Call
-from medor_wire.errors import BadRequest, MedorError, ReconstructionFailed, Unavailable
+from medor_wire.errors import BadRequest, Busy, MedorError, ReconstructionFailed, Unavailable
 from medor_wire.local_bus import LocalBus
 from medor_wire.messages import CameraInfo, DepthView, Empty, Episode, EpisodePick, EpisodeProgress, EpisodeRequest
 from tests.benchmarks.made_up import trial
@@ -48,7 +48,9 @@ class Cell:
         return Episode(ni=0.1 * self._picks, picks=(), flat_coverage_m2=0.1, reason="max_picks")
 
 
-def run(cell: Cell, trials: list[Trial], folder: Path) -> tuple[Results, dict[str, str], Skips, list[str]]:
+def run(
+    cell: Cell, trials: list[Trial], folder: Path, patience_s: float = 0.5
+) -> tuple[Results, dict[str, str], Skips, list[str]]:
     results, told = Results(folder / "picks.jsonl"), []
     results.keep_finished()
     skips = Skips(results.finished())
@@ -56,7 +58,7 @@ def run(cell: Cell, trials: list[Trial], folder: Path) -> tuple[Results, dict[st
         bus.serve(endpoints.EPISODE, cell.episode)
         bus.serve(endpoints.CAPTURE, lambda request, call: view())
         assert bus.ask(endpoints.CAPTURE, Empty()) == view()
-        reasons = ClosedLoop(bus, folder, told.append).run(trials, results, skips)
+        reasons = ClosedLoop(bus, folder, told.append, patience_s).run(trials, results, skips)
     return results, reasons, skips, told
 
 
@@ -111,3 +113,30 @@ def test_a_cell_that_breaks_leaves_nothing_and_is_tried_again(tmp_path: Path) ->
 @pytest.mark.parametrize(("picks", "shown"), [(0, [0]), (1, [0, 1]), (4, [0, 1, 3, 4]), (10, [0, 1, 3, 5, 10])])
 def test_pictures_begin_with_the_start_and_end_with_the_last_pick(picks: int, shown: list[int]) -> None:
     assert moments(picks) == shown
+
+
+class Occupied(Cell):
+    """Still at work on another episode, so many times that it is asked."""
+
+    def __init__(self, times: int) -> None:
+        super().__init__()
+        self._times = times
+
+    def episode(self, request: EpisodeRequest, call: Call) -> Episode:
+        if self._times > 0:
+            self._times -= 1
+            raise Busy("another episode is going on")
+        return super().episode(request, call)
+
+
+def test_a_busy_cell_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("benchmarks.closed_loop.ASK_AGAIN_S", 0.01)
+    results, reasons, _, _ = run(Occupied(3), [trial(state=0), trial(state=1)], tmp_path)
+    assert reasons == {}
+    assert len(results.finished()) == 2
+
+
+def test_a_cell_that_stays_busy_is_not_waited_for_without_end(tmp_path: Path) -> None:
+    results, reasons, _, _ = run(Occupied(1000), [trial()], tmp_path, patience_s=0.02)
+    assert list(reasons) == [trial().key]
+    assert not results.finished()
