@@ -76,14 +76,13 @@ def accelerations(
 
 def corrections(x: Tensor, held: Tensor, edges: NDArray[np.int32], rest: NDArray[np.float32]) -> Tensor:
     """(n, 3) mean of what the edges at each node ask of it to have their rest lengths again [m]."""
-    sums, counts = torch.zeros_like(x), torch.zeros(len(x))
-    for (a, b), length in zip(edges.tolist(), rest, strict=True):
-        way = (x[b] - x[a]) * (1 - length / max((x[b] - x[a]).norm(), 1e-6))
-        free = [not held[a], not held[b]]
-        sums[a] += free[0] * way / max(sum(free), 1)
-        sums[b] -= free[1] * way / max(sum(free), 1)
-        counts[a] += 1
-        counts[b] += 1
+    first, second = torch.from_numpy(edges.T.astype(np.int64))
+    offset, free = x[second] - x[first], (~held).float()
+    way = offset * (1 - torch.from_numpy(rest) / offset.norm(dim=1).clamp(min=1e-6))[:, None]
+    way = way / (free[first] + free[second]).clamp(min=1)[:, None]
+    ones = torch.ones(len(way))
+    sums = torch.zeros_like(x).index_add(0, first, way).index_add(0, second, -way) * free[:, None]
+    counts = torch.zeros(len(x)).index_add(0, first, ones).index_add(0, second, ones)
     return sums / counts.clamp(min=1)[:, None]
 
 
