@@ -12,6 +12,8 @@ from medor_dynamics.physics import Physics
 from medor_dynamics.preset import CPU
 from medor_dynamics.replay import replay_errors
 from medor_dynamics.samples import recordings
+from medor_dynamics.sheet import WIDTH_PX
+from medor_dynamics.sheet import sheet as picture_of
 
 
 @pytest.fixture
@@ -34,3 +36,12 @@ def test_the_solver_that_recorded_a_pull_repeats_it(recorded):
 def test_the_coarse_cloth_is_off_but_foresees_more_than_nothing(recorded):
     (rough,) = replay_errors(Coarse(1), recorded.garments)
     assert 0 < rough < 0.5 * motionless_errors(recordings(recorded, CPU))[0, -1]
+
+
+def test_a_sheet_shows_the_pull_and_what_was_foreseen_of_it(recorded):
+    (pull,) = recorded.garments[0].trajectories()
+    picture = picture_of([pull, pull], {"coarse solver": Coarse(1)})
+    assert picture.shape == (2 * WIDTH_PX, 3 * WIDTH_PX, 3)
+    np.testing.assert_array_equal(picture[:WIDTH_PX], picture[WIDTH_PX:])
+    before, after, foreseen = (picture[:, k * WIDTH_PX : (k + 1) * WIDTH_PX].astype(int) for k in range(3))
+    assert np.abs(before - after).mean() > np.abs(foreseen - after).mean() > 0

@@ -14,13 +14,16 @@ from rich.console import Console
 from rich.table import Table
 
 from medor_cloth.dataset import Dataset, GarmentRecord
+from medor_cloth.picture import png_bytes
 from medor_cloth.solver import SolverConfig
 from medor_dynamics.coarse import Coarse
+from medor_dynamics.learned import Learned
 from medor_dynamics.model import Dynamics, Predictor
 from medor_dynamics.physics import Physics, without_layers
 from medor_dynamics.preset import PULL_STEPS, STEPS
 from medor_dynamics.replay import replay_errors
 from medor_dynamics.samples import Recording, recordings_of, stretches
+from medor_dynamics.sheet import sheet
 from medor_dynamics.shipped import DEFAULT, load
 
 TOGETHER = 8
@@ -82,6 +85,10 @@ class Options:
     """Show the model what the camera sees of the cloth, nothing else."""
     at_most: int = 200
     """Recordings per category."""
+    picture: Path | None = None
+    """PNG of a few pulls: before, recorded, foreseen by the model and by the coarse solver."""
+    pictured: int = 2
+    """Pulls in the picture, of each category."""
 
 
 def main(options: Options) -> None:
@@ -102,6 +109,11 @@ def main(options: Options) -> None:
         means = [*(errors[:, -1].mean() for errors in learned), *(np.mean(list(errors)) for errors in replayed)]
         table.add_row(category, str(len(some)), *(f"{1e3 * mean:.1f}" for mean in means))
     Console().print(table)
+    if options.picture:
+        some = (record for records in by_category.values() for record in records[: options.pictured])
+        shown = [pull for record in some for pull in record.trajectories()[:1]]
+        backends = {"learned": Learned(model.predictor(), 1), "coarse solver": solvers["coarse"]}
+        options.picture.write_bytes(png_bytes(sheet(shown, backends)))
 
 
 if __name__ == "__main__":
