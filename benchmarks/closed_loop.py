@@ -18,6 +18,7 @@ from medor_wire.errors import Busy, MedorError, NoGarment, OutOfReach, Reconstru
 from medor_wire.messages import Empty, EpisodePick, EpisodeProgress, EpisodeRequest, Message
 
 ASK_AGAIN_S = 5.0
+"""Between two questions to a busy cell [s]."""
 GIVEN_UP = (NoGarment, OutOfReach, ReconstructionFailed, SeveralGarments)
 """What a method answers when it cannot go on. The episode counts with the NI it has reached."""
 
@@ -91,14 +92,17 @@ class ClosedLoop:
 
     def _ask_when_free(self, request: EpisodeRequest, report: Callable[[Message], None]) -> None:
         """Asks for an episode. A cell that lost its asker, as a busy machine may, first finishes the one before."""
-        until = time.monotonic() + self._patience_s
+        began, told_so = time.monotonic(), False
         while True:
             try:
                 self._bus.ask(endpoints.EPISODE, request, on_progress=report)
                 return
-            except Busy:
-                if time.monotonic() >= until:
+            except Busy as busy:
+                if time.monotonic() >= began + self._patience_s:
                     raise
+                if not told_so:
+                    self._tell(f"waiting until the cell is free ({told(busy)})")
+                    told_so = True
                 time.sleep(min(ASK_AGAIN_S, self._patience_s))
 
     def _line(self, trial: Trial, step: EpisodePick, seconds: float) -> Line:

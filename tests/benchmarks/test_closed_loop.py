@@ -131,8 +131,9 @@ class Occupied(Cell):
 
 def test_a_busy_cell_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("benchmarks.closed_loop.ASK_AGAIN_S", 0.01)
-    results, reasons, _, _ = run(Occupied(3), [trial(state=0), trial(state=1)], tmp_path)
+    results, reasons, _, told = run(Occupied(3), [trial(state=0), trial(state=1)], tmp_path)
     assert reasons == {}
+    assert sum("waiting" in line for line in told) == 1
     assert len(results.finished()) == 2
 
 

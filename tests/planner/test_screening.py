@@ -127,6 +127,12 @@ def test_where_the_screen_refuses_planning_is_exhaustive_and_says_so_once(lab, t
     assert sum("without screening" in record.getMessage() for record in caplog.records) == 1
 
 
+def test_the_cloth_solver_is_screened_like_any_model(lab, think):
+    physics, screen = think(length, length)
+    assert lab.bus.ask(endpoints.PLAN, ASKED.model_copy(update={"method": "oracle"})).survivors == LEFT
+    assert (sum(screen.asked), sum(physics.asked)) == (200, LEFT + 1)
+
+
 def drawn(count: int) -> Candidates:
     picks = np.random.default_rng(0).uniform(size=(count, 3)).astype(np.float32)
     return Candidates(picks, picks)

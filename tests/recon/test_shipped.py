@@ -8,9 +8,10 @@ from medor_cloth.camera import overhead
 from medor_cloth.coverage import coverage
 from medor_cloth.garment import CATEGORIES, SYMMETRY_ORDER, Garment, generate
 from medor_cloth.goals import solver_of
+from medor_cloth.nocs import NOCS
 from medor_cloth.raster import rasterize
 from medor_cloth.start import dropped
-from medor_recon.networks import SHIPPED
+from medor_recon.networks import SHIPPED, Networks
 from medor_recon.reconstructor import Reconstructor
 from medor_wire.messages import CameraInfo, ClothMesh, DepthView, ReconstructRequest
 
@@ -41,22 +42,62 @@ def turn_about_z(angle: float) -> np.ndarray:
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]], np.float32)
 
 
+def turns(garment: Garment) -> list[np.ndarray]:
+    """Rotations about the body axis that are forgiven."""
+    count = max(SYMMETRY_ORDER[garment.category], 2)
+    return [turn_about_z(2 * np.pi * k / count) for k in range(count)]
+
+
 def misplaced(mesh: ClothMesh, garment: Garment, positions: np.ndarray) -> float:
     """Mean distance of the vertices, hidden ones included, from where they are said to be, the side forgiven; in units
     of what saying the middle of the garment of all of them would give."""
     assert mesh.canonical is not None
-    said, turns = KDTree(mesh.canonical), max(SYMMETRY_ORDER[garment.category], 2)
-    turned = [garment.vertices @ turn_about_z(2 * np.pi * k / turns).T for k in range(turns)]
-    errors = [np.linalg.norm(mesh.vertices[said.query(each)[1]] - positions, axis=1).mean() for each in turned]
+    said, true = KDTree(mesh.canonical), [garment.vertices @ turn.T for turn in turns(garment)]
+    errors = [np.linalg.norm(mesh.vertices[said.query(each)[1]] - positions, axis=1).mean() for each in true]
     return float(min(errors) / np.linalg.norm(positions - positions.mean(axis=0), axis=1).mean())
 
 
-@pytest.mark.parametrize("category", CATEGORIES)
-def test_a_garment_laid_flat_is_understood(reconstructor, category):
+def canonical_errors(
+    said: np.ndarray, points: np.ndarray, garment: Garment, positions: np.ndarray
+) -> tuple[float, float]:
+    """Mean distance [m] of canonical coordinates from those of the true vertices nearest to the points they are said
+    of, the side forgiven; and that of the best constant answer."""
+    true = garment.vertices[KDTree(positions).query(points)[1]]
+    constant = np.linalg.norm(true - true.mean(axis=0), axis=1).mean()
+    return float(min(np.linalg.norm(said - true @ turn.T, axis=1).mean() for turn in turns(garment))), float(constant)
+
+
+def flat(category: str) -> tuple[Garment, np.ndarray, DepthView]:
     garment = generate(category, SEED)
     positions = garment.laid_flat() @ turn_about_z(0.64).T
-    seen = view_of(positions, garment.faces)
-    mesh = reconstructor.reconstruct(ReconstructRequest(view=seen, category=category, method="isometric")).mesh
+    return garment, positions, view_of(positions, garment.faces)
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_the_pixels_of_a_garment_laid_flat_are_understood(category):
+    garment, positions, view = flat(category)
+    seen = Networks().canonicalizer("cpu", category).canonicalize(category, view.depth, overhead(720))
+    error, constant = canonical_errors(NOCS[category].decode(seen.nocs), seen.points, garment, positions)
+    assert error < 0.5 * constant
+
+
+MERGED = pytest.mark.xfail(reason="finetuning lays the layers of a flat skirt into one: 0.8", strict=True)
+
+
+@pytest.mark.parametrize(
+    "category", [pytest.param(each, marks=MERGED) if each == "skirt" else each for each in CATEGORIES]
+)
+def test_what_counts_as_visible_of_a_garment_laid_flat_is(reconstructor, category):
+    garment, positions, view = flat(category)
+    mesh = reconstructor.reconstruct(ReconstructRequest(view=view, category=category, method="isometric")).mesh
+    error, constant = canonical_errors(mesh.canonical[mesh.visible], mesh.vertices[mesh.visible], garment, positions)
+    assert error < 0.5 * constant
+
+
+@pytest.mark.parametrize("category", CATEGORIES)
+def test_a_garment_laid_flat_comes_back_in_its_place(reconstructor, category):
+    garment, positions, view = flat(category)
+    mesh = reconstructor.reconstruct(ReconstructRequest(view=view, category=category, method="isometric")).mesh
     assert misplaced(mesh, garment, positions) < 0.25
 
 

@@ -110,8 +110,8 @@ def main(options: Options) -> None:
         table.add_row(category, str(len(some)), *(f"{1e3 * mean:.1f}" for mean in means))
     Console().print(table)
     if options.picture:
-        some = (record for records in by_category.values() for record in records[: options.pictured])
-        shown = [pull for record in some for pull in record.trajectories()[:1]]
+        few = (record for records in by_category.values() for record in records[: options.pictured])
+        shown = [pull for record in few for pull in record.trajectories()[:1]]
         backends = {"learned": Learned(model.predictor(), 1), "coarse solver": solvers["coarse"]}
         options.picture.write_bytes(png_bytes(sheet(shown, backends)))
 

@@ -118,7 +118,10 @@ def spread(recordings: list[Recording], at_most: int) -> list[Recording]:
 def card(options: Options, preset: Preset, training: Dataset) -> dict[str, Any]:
     """All it takes to build the model, and what it learnt from."""
     sampling = {name: getattr(options, name) for name in ("batch", "unroll", "noise", "mirror", "turn", "visible_only")}
+    asked = ("preset", "hours", "batch", "unroll", "noise", "lr", "seed")
+    words = [f"--{name} {value}" for name in asked if (value := getattr(options, name)) is not None]
     return {
+        "command": " ".join(["python -m medor_dynamics.train", *words]),
         "preset": asdict(preset),
         "training": sampling | {"seed": options.seed},
         "data": {
