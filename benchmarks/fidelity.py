@@ -122,7 +122,7 @@ def corner_pull(flat: Flat, friction: bool = True) -> Pull:
     slippery = replace(config, table_friction=0.0, layer_friction=0.0)
     solver = Solver(flat.solver.cloth, config if friction else slippery)
     pick = folded.positions[corner] + [0, 0, 0.01]
-    after = pick_place(solver, folded, pick, pick - PULL_M * _DIAGONAL + [0, 0, 0.03], settle_frames=100).state
+    after = pick_place(solver, folded, pick, pick - PULL_M * _DIAGONAL + [0, 0, 0.03]).state
     positions = flat.state.positions
     beyond = (positions - positions[corner]) @ _DIAGONAL > FOLD_M * np.sqrt(2)
     way = (after.positions - folded.positions)[beyond, :2].mean(axis=0)

@@ -129,7 +129,7 @@ class Cell:
         outermost = self.flat.positions[self.flat.positions[:, :2].sum(axis=1).argmin()]
         pick = outermost + np.array([0, 0, 0.01], np.float32)
         middle = np.array([0.02, 0.02, 0.06], np.float32)
-        self.lay(pick_place(self.solver, self.flat, pick, middle, settle_frames=100).state)
+        self.lay(pick_place(self.solver, self.flat, pick, middle).state)
 
     def capture(self, _: Empty, call: Call) -> DepthView:
         return view_of(self.positions, self.garment.faces, self.camera)
@@ -149,7 +149,7 @@ class Cell:
     def _move(self, request: ActRequest, check: Check) -> ActOutcome:
         self.acts.append(request.action_id)
         self.executors.append(request.executor)
-        outcome = pick_place(self.solver, self.state, request.pick, request.place, settle_frames=100)
+        outcome = pick_place(self.solver, self.state, request.pick, request.place)
         self.state = self.solver.rest(outcome.state.positions)
         return ActOutcome(action_id=request.action_id, grasped=outcome.grasped)
 

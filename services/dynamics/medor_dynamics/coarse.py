@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from medor_cloth.cloth import Cloth
 from medor_cloth.errors import ClothError
+from medor_cloth.picker import GLANCE_FRAMES
 from medor_cloth.rollout import Cancelled as Stopped
 from medor_cloth.rollout import rollouts
 from medor_cloth.solver import Solver, SolverConfig
@@ -46,6 +47,7 @@ class Coarse(OnNodes):
                 start,
                 picks,
                 picks + pulls.displacements,
+                settle_frames=GLANCE_FRAMES,
                 threads=self._threads,
                 cancelled=call.cancelled,
                 on_done=on_done,

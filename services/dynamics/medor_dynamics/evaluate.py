@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from medor_cloth.dataset import Dataset, GarmentRecord
+from medor_cloth.picker import GLANCE_FRAMES
 from medor_cloth.picture import png_bytes
 from medor_cloth.solver import SolverConfig
 from medor_dynamics.coarse import Coarse
@@ -95,7 +96,11 @@ def main(options: Options) -> None:
     torch.set_num_threads(1)
     model, dataset = load(options.weights), Dataset(options.test)
     rough = without_layers(SolverConfig())
-    solvers = {"whole": Physics(1), "without layers": Physics(1, config=rough), "coarse": Coarse(1)}
+    solvers = {
+        "whole": Physics(1, settle_frames=GLANCE_FRAMES),
+        "without layers": Physics(1, config=rough, settle_frames=GLANCE_FRAMES),
+        "coarse": Coarse(1),
+    }
     table = Table("category", "pulls", "model", "no motion", "rigid", *(f"solver, {name}" for name in solvers))
     table.title = "mean error of the nodes after 16 steps [mm]"
     by_category: dict[str, list[GarmentRecord]] = defaultdict(list)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from medor_cloth.cloth import Cloth
 from medor_cloth.errors import ClothError
+from medor_cloth.picker import SETTLE_FRAMES
 from medor_cloth.rollout import Cancelled as Stopped
 from medor_cloth.rollout import rollouts
 from medor_cloth.solver import Solver, SolverConfig
@@ -29,10 +30,20 @@ def without_layers(config: SolverConfig) -> SolverConfig:
 
 
 class Physics:
-    """Rolls candidates out on a mesh with as many threads as it is given."""
+    """Rolls candidates out on a mesh with as many threads as it is given.
 
-    def __init__(self, threads: int, keep: int = 8, config: SolverConfig | None = None) -> None:
-        self._threads = threads
+    Args:
+        threads: how many to use.
+        keep: solvers kept, of the meshes asked for last.
+        config: constants of the cloth.
+        settle_frames: longest time the cloth gets to settle. With the default a mesh that is true ends where the
+            simulated cell's cloth will, to the bit.
+    """
+
+    def __init__(
+        self, threads: int, keep: int = 8, config: SolverConfig | None = None, settle_frames: int = SETTLE_FRAMES
+    ) -> None:
+        self._threads, self._settle_frames = threads, settle_frames
         self._solver_of = lru_cache(keep)(partial(solver_of, config=config))
 
     def roll_out(self, request: RolloutRequest, call: Call) -> Rollouts:
@@ -51,6 +62,7 @@ class Physics:
                 mesh.vertices,
                 request.picks,
                 request.places,
+                settle_frames=self._settle_frames,
                 threads=self._threads,
                 cancelled=call.cancelled,
                 on_done=lambda done: call.progress(RolloutProgress(done=done, total=total)),

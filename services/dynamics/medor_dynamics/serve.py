@@ -10,6 +10,7 @@ from typing import Literal
 import torch
 from pydantic import Field
 
+from medor_cloth.picker import GLANCE_FRAMES
 from medor_cloth.solver import SolverConfig
 from medor_dynamics.coarse import Coarse
 from medor_dynamics.flatten import Flattener
@@ -46,7 +47,7 @@ def main(config: Config) -> None:
     roller = Roller(
         {
             "physics": Physics(threads, config=cloth),
-            "layerless": Physics(threads, config=without_layers(cloth)),
+            "layerless": Physics(threads, config=without_layers(cloth), settle_frames=GLANCE_FRAMES),
             "learned": learned(config.weights, threads, precision),
             "coarse": Coarse(threads, config=cloth),
         }

@@ -10,7 +10,7 @@ from medor_cloth.alignment import canonical_cost
 from medor_cloth.camera import Camera
 from medor_cloth.coverage import coverage
 from medor_cloth.improvement import normalized_improvement_canonical, normalized_improvement_flatten
-from medor_cloth.picker import SETTLED_SPEED, pull
+from medor_cloth.picker import SETTLE_FRAMES, SETTLED_SPEED, pull
 from medor_cloth.raster import visible_vertices
 from medor_cloth.solver import ClothState
 from medor_cloth.start import dropped, picked
@@ -18,8 +18,6 @@ from medor_sim.wardrobe import Piece
 from medor_wire.errors import MedorError
 from medor_wire.messages import ClothMesh, Score, StartState, Truth
 
-SETTLE_FRAMES = 100
-"""Longest time the cloth gets to settle after an executed action, in frames of 0.01 s."""
 SLICE_FRAMES = 5
 """A stop takes effect within this many frames."""
 MIN_COST_M = 0.001
@@ -76,6 +74,8 @@ class Scene:
     ) -> "Pulled":
         """The scene after the picker has walked a path, then opened, and the cloth has settled: one action.
 
+        It is at rest then, whatever speed is left in it: seconds pass before the next action begins.
+
         Args:
             start: Centre of the empty picker when the walk begins (3,) [m].
             path: Its centre at the end of each frame of 0.01 s (T,3) [m].
@@ -98,7 +98,8 @@ class Scene:
         except MedorError as error:
             stopped = error
         now = engine.advance(now, SETTLE_FRAMES, settle_speed=SETTLED_SPEED)
-        return Pulled(replace(self, cloth=now, picks=self.picks + 1), grasped, stopped, walked)
+        at_rest = replace(engine.rest(now.positions), frame=now.frame)
+        return Pulled(replace(self, cloth=at_rest, picks=self.picks + 1), grasped, stopped, walked)
 
     def score(self) -> Score:
         """The referee's figures. An improvement is 0 where the start left no room for one."""

@@ -10,8 +10,10 @@ from medor_cloth.solver import ClothState
 
 PULL_FRAMES = 50
 """Frames of the pull from pick to place."""
-SETTLE_FRAMES = 30
-"""Frames a released cloth is given to settle."""
+SETTLE_FRAMES = 100
+"""Frames a released cloth is given to settle, at most."""
+GLANCE_FRAMES = 30
+"""Frames after the release that a rough or a learned model foresees (MEDOR, section 6): the cloth may still move."""
 SETTLED_SPEED = 0.05
 """Speed below which the cloth counts as settled [m/s]."""
 

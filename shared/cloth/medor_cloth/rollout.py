@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from medor_cloth.errors import ClothError
-from medor_cloth.picker import pick_place
+from medor_cloth.picker import SETTLE_FRAMES, pick_place
 from medor_cloth.solver import ClothState, Solver
 
 
@@ -23,6 +23,7 @@ def rollouts(
     picks: ArrayLike,
     places: ArrayLike,
     *,
+    settle_frames: int = SETTLE_FRAMES,
     threads: int = 0,
     cancelled: Callable[[], bool] | None = None,
     on_done: Callable[[int], None] | None = None,
@@ -34,6 +35,7 @@ def rollouts(
         state: Where the cloth is, or its positions at rest (V,3) [m].
         picks: Picker centres where it closes (K,3) [m].
         places: Picker centres where it opens (K,3) [m].
+        settle_frames: Longest time each cloth gets to settle after the release.
         threads: How many to use; 0 means every processor. The result does not depend on it.
         cancelled: Asked before each rollout; once true, no further one is started.
         on_done: Told the number of finished rollouts after each one, from any thread but never twice at a time.
@@ -55,7 +57,7 @@ def rollouts(
         if stop.is_set() or (cancelled is not None and cancelled()):
             stop.set()
             return
-        after[k] = pick_place(solver, start, picks[k], places[k]).state.positions
+        after[k] = pick_place(solver, start, picks[k], places[k], settle_frames=settle_frames).state.positions
         with counting:
             done += 1
             if on_done is not None:

@@ -69,7 +69,7 @@ def picked(solver: Engine, flat: ClothState, rng: np.random.Generator, picks: in
     for _ in range(picks):
         for _ in range(MAX_TRIES):
             pick, place = random_pick(state.positions, rng)
-            after = solver.rest(pick_place(solver, state, pick, place, settle_frames=100).state.positions)
+            after = solver.rest(pick_place(solver, state, pick, place).state.positions)
             if np.abs(after.positions[:, :2]).max() < VIEW_M:
                 state = after
                 break
