@@ -7,6 +7,7 @@ from scipy.ndimage import binary_dilation
 
 from medor_cloth.camera import Camera
 from medor_cloth.coverage import coverage
+from medor_cloth.picker import SETTLE_FRAMES, pick_place
 from medor_cloth.rollout import rollouts
 from medor_sim.scene import Scene
 from medor_wire.bus import Call
@@ -84,6 +85,16 @@ def test_truth_carries_the_garment_in_both_spaces(bench):
     assert truth.mesh.panel_uv is not None
     assert np.ptp(truth.mesh.canonical[:, 2]) > 0.05
     assert 0.2 < truth.mesh.visible.mean() < 0.8  # a tube pressed flat hides its back
+
+
+def test_an_action_is_the_pull_that_rollouts_predict(bench, wardrobe):
+    scene = Scene.begin(wardrobe.generated("skirt", 800001), "flat", 0)
+    pick = scene.cloth.positions[scene.cloth.positions[:, 0].argmax()] + LIFT
+    place = pick + [-0.08, 0.02, 0.05]
+    pulled = scene.pulled(pick, place, lambda: None)
+    predicted = pick_place(scene.piece.solver, scene.cloth, pick, place, settle_frames=SETTLE_FRAMES)
+    assert np.array_equal(pulled.scene.cloth.positions, predicted.state.positions)
+    assert pulled.grasped is predicted.grasped is True
 
 
 def test_an_action_is_the_pull_that_rollouts_predict_from_what_they_are_told(wardrobe):
