@@ -13,7 +13,7 @@ PULL_FRAMES = 50
 SETTLE_FRAMES = 100
 """Frames a released cloth is given to settle, at most."""
 GLANCE_FRAMES = 30
-"""Frames after the release that a rough or learned model foresees (MEDOR, dynamics model): cloth may still move then."""
+"""Frames after the release that a rough or learned model foresees (MEDOR, dynamics model): cloth may still move."""
 SETTLED_SPEED = 0.05
 """Speed below which the cloth counts as settled [m/s]."""
 
