@@ -76,6 +76,18 @@ def test_the_gradient_is_that_of_finite_differences(rods):
     assert torch.autograd.gradcheck(lambda at: lengths_kept(graphs, at, held, 3), positions)
 
 
+def test_without_gradients_the_kernel_does_the_same(sheet_graphs):
+    graphs, positions = sheet_graphs
+    disturbed = positions + 0.01 * torch.randn(positions.shape, generator=torch.manual_seed(0))
+    held = torch.tensor([3, 17])
+    expected = lengths_kept(graphs, disturbed, held, 5)
+    with torch.inference_mode():
+        kept = lengths_kept(graphs, disturbed, held, 5)
+    assert (expected - disturbed).norm(dim=1).max() > 0.005
+    torch.testing.assert_close(kept, expected, atol=1e-6, rtol=0)
+    torch.testing.assert_close(kept[held], disturbed[held], atol=0, rtol=0)
+
+
 def test_velocities_are_those_of_the_places_that_are_kept(sheet_graphs, model):
     """As in the recordings that models are taught with, and the node held still moves as its picker."""
     graphs, positions = sheet_graphs

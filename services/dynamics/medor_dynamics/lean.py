@@ -1,11 +1,10 @@
 """The graph network's forward pass for rollouts on a CPU: the same numbers with a fraction of the memory traffic.
 
-Matrix products are torch's. All that lies between them (gathering, adding, biases, ReLU, summing into receivers) is
-done in one pass each, in float32 arithmetic over values kept in the network's precision.
+Layers are those of `dense`. What lies between them (gathering, adding, summing into receivers) takes one pass each,
+in float32 arithmetic over values kept in the network's precision.
 """
 
 from collections.abc import Callable
-from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -13,9 +12,10 @@ import torch
 from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 
 from medor_cloth.kernel import kernel
+from medor_dynamics.dense import Dense, DenseMlp
 from medor_dynamics.graphs import Wiring
 from medor_dynamics.network import Block, GraphNetwork, edge_graphs
 
@@ -27,10 +27,10 @@ class LeanNetwork:
     """
 
     def __init__(self, network: GraphNetwork, dtype: torch.dtype) -> None:
-        """`dtype` is the precision of weights and hidden values: float32 or bfloat16. Biases stay float32."""
-        self._encode_nodes = cast(network.encode_nodes, dtype)
-        self._encode_edges = LeanMlp(network.encode_edges, dtype)
-        self._decode = cast(network.decode, dtype)
+        """`dtype` is the precision of weights and hidden values: float32 or bfloat16."""
+        self._encode_nodes = DenseMlp(network.encode_nodes, dtype)
+        self._encode_edges = DenseMlp(network.encode_edges, dtype)
+        self._decode = DenseMlp(network.decode, torch.float32)
         self._blocks = [LeanBlock(block, dtype) for block in network.blocks if isinstance(block, Block)]
         self._width = network.width
 
@@ -42,68 +42,48 @@ class LeanNetwork:
     def _forward(self, nodes: Tensor, edges: Tensor, wiring: Wiring) -> Tensor:
         nodes, edges = self._encode_nodes(nodes), self._encode_edges(edges)
         shared = nodes.new_zeros(wiring.graphs, self._width)
-        nodes_out, scratch = nodes, (torch.empty_like(edges), torch.empty_like(edges))
+        nodes_out, hidden = nodes, torch.empty_like(edges)
         for last, block in zip(reversed(range(len(self._blocks))), self._blocks, strict=True):
-            nodes_out, shared_out = block(nodes, edges, shared, wiring, scratch, update_edges=last > 0)
+            nodes_out, shared_out = block(nodes, edges, shared, wiring, hidden, update_edges=last > 0)
             nodes, shared = nodes + nodes_out, shared + shared_out
-        return self._decode(nodes_out)
-
-
-class LeanMlp:
-    """Two hidden layers, biases and ReLU added in place."""
-
-    def __init__(self, layers: nn.Sequential, dtype: torch.dtype) -> None:
-        self._layers = [(weight_of(layers[at], dtype), bias_of(layers[at])) for at in (0, 2, 4)]
-
-    def __call__(self, values: Tensor) -> Tensor:
-        for weight, bias in self._layers[:-1]:
-            values = values @ weight
-            add_bias_relu(raw(values), bias)
-        weight, bias = self._layers[-1]
-        return torch.addmm(torch.from_numpy(bias).to(values.dtype), values, weight)
+        return self._decode(nodes_out.float())
 
 
 class LeanBlock:
     """One round of message passing."""
 
     def __init__(self, block: Block, dtype: torch.dtype) -> None:
-        first, second, third = block.edge[0], block.edge[2], block.edge[4]
-        parts = weight_of(first, dtype).split(block.width)
+        first, self._second = (Dense.of(block.edge[at], dtype) for at in (0, 2))
+        parts = first.weight.t().split(block.width)
         self._receiver, self._sender, self._edge, *self._shared = (part.contiguous() for part in parts)
-        self._second, self._third = weight_of(second, dtype), weight_of(third, dtype)
-        self._first_bias = torch.from_numpy(bias_of(first)).to(dtype)
-        self._second_bias, self._third_bias = bias_of(second), bias_of(third)
-        self._third_of_sums = self._third.float()
-        self._node = cast(block.node, dtype)
-        self._global = cast(block.shared, dtype) if block.shared is not None else None
+        self._first_bias = first.bias
+        self._third = Dense.of(block.edge[4], torch.float32)
+        self._third_weight = self._third.weight.t().to(dtype).contiguous()
+        self._node = DenseMlp(block.node, dtype)
+        self._global = DenseMlp(block.shared, dtype) if block.shared is not None else None
 
     def __call__(
-        self,
-        nodes: Tensor,
-        edges: Tensor,
-        shared: Tensor,
-        wiring: Wiring,
-        scratch: tuple[Tensor, Tensor],
-        update_edges: bool,
+        self, nodes: Tensor, edges: Tensor, shared: Tensor, wiring: Wiring, hidden: Tensor, update_edges: bool
     ) -> tuple[Tensor, Tensor]:
-        """What nodes (N, width) and global vectors (B, width) gain; edges (E, width) gain theirs in place."""
-        hidden, other = scratch
+        """What nodes (N, width) and global vectors (B, width) gain; edges (E, width) gain theirs in place.
+
+        `hidden` (E, width) is overwritten.
+        """
         received = torch.addmm(self._first_bias, nodes, self._receiver)
         if self._shared:
             received += (shared @ self._shared[0])[wiring.graph_of]
         senders, receivers = wiring.senders.numpy(), wiring.receivers.numpy()
         torch.mm(edges, self._edge, out=hidden)
         add_ends_relu(raw(hidden), raw(received), raw(nodes @ self._sender), senders, receivers)
-        torch.mm(hidden, self._second, out=other)
-        add_bias_relu(raw(other), self._second_bias)
+        second = self._second.relu(hidden)
         sums = torch.zeros(nodes.shape, dtype=torch.float32)
         if update_edges:
-            torch.mm(other, self._third, out=hidden)
-            sum_and_add(raw(hidden), self._third_bias, raw(edges), receivers, sums.numpy())
+            torch.mm(second, self._third_weight, out=hidden)
+            sum_and_add(raw(hidden), self._third.bias.numpy(), raw(edges), receivers, sums.numpy())
         else:  # nobody asks what single edges become, and the last layer of a sum is the sum of last layers
-            sum_into_receivers(raw(other), receivers, sums.numpy())
+            sum_into_receivers(raw(second), receivers, sums.numpy())
             received = torch.bincount(wiring.receivers, minlength=len(nodes))
-            sums = sums @ self._third_of_sums + received[:, None] * torch.from_numpy(self._third_bias)
+            sums = sums @ self._third.weight.t() + received[:, None] * self._third.bias
         return self._nodes_and_shared(nodes, sums, shared, wiring)
 
     def _nodes_and_shared(self, nodes: Tensor, sums: Tensor, shared: Tensor, wiring: Wiring) -> tuple[Tensor, Tensor]:
@@ -117,22 +97,6 @@ class LeanBlock:
         sizes = [torch.bincount(of, minlength=wiring.graphs) for of in (wiring.graph_of, edge_graphs(wiring))]
         means = per_graph / torch.stack(sizes, dim=1).clamp(min=1)[:, :, None]
         return nodes_out, self._global(torch.cat([shared, means.flatten(1).to(shared.dtype)], dim=1))
-
-
-def cast(layers: nn.Module, dtype: torch.dtype) -> nn.Module:
-    """A copy in another precision."""
-    return deepcopy(layers).to(dtype)
-
-
-def weight_of(layer: nn.Module, dtype: torch.dtype) -> Tensor:
-    """(in, out)."""
-    assert isinstance(layer, nn.Linear)
-    return layer.weight.detach().t().to(dtype).contiguous()
-
-
-def bias_of(layer: nn.Module) -> NDArray[np.float32]:
-    assert isinstance(layer, nn.Linear)
-    return layer.bias.detach().float().clone().numpy()
 
 
 def raw(values: Tensor) -> NDArray:
@@ -178,14 +142,6 @@ def add_ends_relu(hidden, received, sent, senders, receivers):
         for c in range(hidden.shape[1]):
             value = _read(hidden[edge, c]) + _read(received[receiver, c]) + _read(sent[sender, c])
             hidden[edge, c] = _stored_like(max(value, np.float32(0)), hidden[edge, c])
-
-
-@kernel
-def add_bias_relu(hidden, bias):
-    """Bias and ReLU, in place."""
-    for row in range(len(hidden)):
-        for c in range(hidden.shape[1]):
-            hidden[row, c] = _stored_like(max(_read(hidden[row, c]) + bias[c], np.float32(0)), hidden[row, c])
 
 
 @kernel
