@@ -14,13 +14,26 @@ from benchmarks.skips import Skips, told
 from medor_learn.revision import revision
 from medor_wire import endpoints
 from medor_wire.bus import Bus
-from medor_wire.errors import Busy, MedorError, NoGarment, OutOfReach, ReconstructionFailed, SeveralGarments
+from medor_wire.errors import (
+    Busy,
+    LeaseLost,
+    MedorError,
+    NoGarment,
+    OutOfReach,
+    ReconstructionFailed,
+    SeveralGarments,
+    Timeout,
+    Unavailable,
+)
 from medor_wire.messages import Empty, EpisodePick, EpisodeProgress, EpisodeRequest, Message
 
 ASK_AGAIN_S = 5.0
 """Between two questions to a busy cell [s]."""
 GIVEN_UP = (NoGarment, OutOfReach, ReconstructionFailed, SeveralGarments)
 """What a method answers when it cannot go on. The episode counts with the NI it has reached."""
+
+LOST = (LeaseLost, Timeout, Unavailable)
+"""What becomes of an episode on a machine that has more to do than it can. It says nothing of the method."""
 
 
 class ClosedLoop:
@@ -37,22 +50,29 @@ class ClosedLoop:
         self._commit = revision()
 
     def run(self, missing: Sequence[Trial], results: Results, skips: Skips) -> dict[str, str]:
-        """Runs trials one after the other; why those that are not in the file now are not, by key."""
-        pace, reasons = Pace(results.lines()), {}
-        for done, trial in enumerate(missing):
+        """Runs trials one after the other; why those that are not in the file now are not, by key.
+
+        Trials that were lost are run once more, after all others.
+        """
+        pace, reasons, queue = Pace(results.lines()), {}, list(missing)
+        for done, trial in enumerate(queue):  # which grows
             if reason := skips.reason(trial):
                 reasons[trial.key] = reason
                 continue
-            left = pace.left(one for one in missing[done:] if skips.reason(one) is None)
+            left = pace.left(one for one in queue[done:] if skips.reason(one) is None)
             began = time.monotonic()
             try:
-                results.append(self.episode(trial, f"[{done + 1}/{len(missing)}, {_minutes(left)}]"))
+                results.append(self.episode(trial, f"[{done + 1}/{len(queue)}, {_minutes(left)}]"))
             except MedorError as error:
+                lost = isinstance(error, LOST) and trial.key not in reasons
+                if lost:
+                    queue.append(trial)
                 reasons[trial.key] = told(error)
                 skips.refused(trial, error)
                 over = f"; {trial.method} is left out for {trial.category}" if skips.reason(trial) else ""
-                self._tell(f"{trial.key}  {told(error)}{over}")
+                self._tell(f"{trial.key}  {told(error)}{'; once more later' if lost else over}")
             else:
+                reasons.pop(trial.key, None)
                 skips.works(trial)
                 pace.add(trial, time.monotonic() - began)
         return reasons

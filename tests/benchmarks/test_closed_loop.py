@@ -15,7 +15,7 @@ from benchmarks.skips import Skips
 from medor_cloth.camera import overhead
 from medor_wire import endpoints
 from medor_wire.bus import Call
-from medor_wire.errors import BadRequest, Busy, MedorError, ReconstructionFailed, Unavailable
+from medor_wire.errors import BadRequest, Busy, LeaseLost, MedorError, ReconstructionFailed, Timeout, Unavailable
 from medor_wire.local_bus import LocalBus
 from medor_wire.messages import CameraInfo, DepthView, Empty, Episode, EpisodePick, EpisodeProgress, EpisodeRequest
 from tests.benchmarks.made_up import trial
@@ -98,6 +98,32 @@ def test_who_gives_up_keeps_what_was_reached(tmp_path: Path) -> None:
     assert reasons == {}
     last = results.lines()[-1]
     assert (last["ni"], last["last"], last["gave_up"]) == (0.2, True, "reconstruction_failed")
+
+
+class Forgetful(Cell):
+    """Loses every episode the first time."""
+
+    def __init__(self, error: MedorError) -> None:
+        super().__init__(self._first)
+        self._error = error
+
+    def _first(self, request: EpisodeRequest) -> MedorError | None:
+        return self._error if self.asked.count(request) == 1 else None
+
+
+@pytest.mark.parametrize("error", [LeaseLost("by nobody"), Timeout("too late"), Unavailable("no answer")])
+def test_what_is_lost_is_run_once_more_after_all_others(tmp_path: Path, error: MedorError) -> None:
+    cell, trials = Forgetful(error), [trial(state=state) for state in range(2)]
+    results, reasons, _, _ = run(cell, trials, tmp_path)
+    assert [request.seed for request in cell.asked] == [0, 1, 0, 1]
+    assert (results.finished(), reasons) == ({one.key for one in trials}, {})
+
+
+def test_what_is_lost_twice_is_given_up(tmp_path: Path) -> None:
+    cell = Cell(lambda request: Unavailable("gone"))
+    _, reasons, _, _ = run(cell, [trial()], tmp_path)
+    assert len(cell.asked) == 2
+    assert list(reasons) == [trial().key]
 
 
 def test_a_cell_that_breaks_leaves_nothing_and_is_tried_again(tmp_path: Path) -> None:
