@@ -27,8 +27,11 @@ class LeanNetwork:
     """
 
     def __init__(self, network: GraphNetwork, dtype: torch.dtype) -> None:
-        """`dtype` is the precision of weights and hidden values: float32 or bfloat16."""
-        self._encode_nodes = DenseMlp(network.encode_nodes, dtype)
+        """`dtype` is the precision of weights and hidden values: float32 or bfloat16.
+
+        Nodes, of which there are few, begin, are summed up and are decoded in float32.
+        """
+        self._encode_nodes = DenseMlp(network.encode_nodes, torch.float32)
         self._encode_edges = DenseMlp(network.encode_edges, dtype)
         self._decode = DenseMlp(network.decode, torch.float32)
         self._blocks = [LeanBlock(block, dtype) for block in network.blocks if isinstance(block, Block)]
@@ -40,11 +43,11 @@ class LeanNetwork:
             return self._forward(nodes, edges, wiring)
 
     def _forward(self, nodes: Tensor, edges: Tensor, wiring: Wiring) -> Tensor:
-        nodes, edges = self._encode_nodes(nodes), self._encode_edges(edges)
-        shared = nodes.new_zeros(wiring.graphs, self._width)
+        nodes, edges = self._encode_nodes(nodes.float()), self._encode_edges(edges)
+        shared = edges.new_zeros(wiring.graphs, self._width)
         nodes_out, hidden = nodes, torch.empty_like(edges)
         for last, block in zip(reversed(range(len(self._blocks))), self._blocks, strict=True):
-            nodes_out, shared_out = block(nodes, edges, shared, wiring, hidden, update_edges=last > 0)
+            nodes_out, shared_out = block(nodes.to(edges.dtype), edges, shared, wiring, hidden, update_edges=last > 0)
             nodes, shared = nodes + nodes_out, shared + shared_out
         return self._decode(nodes_out.float())
 
