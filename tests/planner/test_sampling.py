@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
+from medor_cloth.grasp import REACH_M
 from medor_planner.random_policy import CLEARANCE_M, random_action
 from medor_planner.sampling import LENGTHS_M, PICKER_ABOVE_M, Scene, anywhere, pulls, sample
 from medor_wire.errors import NoGarment, OutOfReach, ReconstructionFailed
@@ -132,6 +133,36 @@ def test_a_mesh_without_visible_vertices_is_said_so(sheet_scene):
     hidden = scene.mesh.model_copy(update={"visible": np.zeros(len(scene.mesh.vertices), bool)})
     with pytest.raises(ReconstructionFailed):
         sample(Scene(hidden, scene.view), 5, rng(), reachable=every_pull)
+
+
+def test_cloth_that_is_only_believed_in_is_not_picked(sheet_scene):
+    """A mesh that lies 7 cm too far to the right is picked where it overlaps with what was seen."""
+    scene = sheet_scene()
+    aside = scene.mesh.model_copy(update={"vertices": scene.mesh.vertices + np.array([0.07, 0, 0], np.float32)})
+    wrong = Scene(aside, scene.view)
+    candidates = sample(wrong, 400, rng(), reachable=every_pull)
+    edge = scene.mesh.vertices[:, 0].max()
+    assert len(candidates) == 400
+    assert wrong.visible[:, 0].max() > edge + 0.06
+    assert edge < candidates.picks[:, 0].max() <= edge + REACH_M
+    reached, _ = KDTree(scene.mesh.vertices).query(candidates.picks)
+    assert (reached < REACH_M + 0.01).all()
+
+
+def test_a_mesh_beside_the_garment_is_said_so(sheet_scene):
+    scene = sheet_scene()
+    beside = scene.mesh.model_copy(update={"vertices": scene.mesh.vertices * [1, 1, 0] + [0, 0, 0.05]})
+    with pytest.raises(ReconstructionFailed, match="beside"):
+        sample(Scene(beside, scene.view), 5, rng(), reachable=every_pull)
+
+
+def test_what_was_seen_ends_with_the_mask(scene):
+    half = np.zeros(scene.view.depth.shape, bool)
+    half[:, : scene.camera.width // 2] = True
+    masked = Scene(scene.mesh, scene.view.model_copy(update={"mask": half}))
+    assert scene.seen[:, 0].max() > 0.025
+    assert masked.seen[:, 0].max() <= 0
+    assert masked.pickable[:, 0].max() <= REACH_M < scene.pickable[:, 0].max()
 
 
 def test_the_random_policy_places_off_the_cloth(scene):

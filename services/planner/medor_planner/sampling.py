@@ -2,6 +2,7 @@
 
 MEDOR, section IV-C: a uniform pixel of the garment's bounding box becomes the nearest visible vertex, so that all
 pixels off the cloth fall on its outline, where unfolding picks are; the place lies 5 to 20 cm away, never lower.
+A mesh may believe cloth where none was seen; the picker would close on nothing there, so nobody picks it.
 """
 
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from medor_cloth.camera import Camera
+from medor_cloth.grasp import REACH_M
 from medor_wire.errors import NoGarment, OutOfReach, ReconstructionFailed
 from medor_wire.messages import ClothMesh, DepthView
 
@@ -22,6 +24,7 @@ SURFACE_HEIGHT_M = 0.005
 """Height at which a pixel without cloth meets the scene [m]."""
 PICKER_ABOVE_M = 0.01
 """The picker's centre above the picked vertex [m]."""
+ABOVE = np.array([0, 0, PICKER_ABOVE_M], np.float32)
 LENGTHS_M = (0.05, 0.2)
 """Shortest and longest distance from pick to place [m]."""
 DIRECTIONS_PER_PICK = 16
@@ -106,8 +109,28 @@ class Scene:
         return self.mesh.vertices[self.mesh.visible]
 
     @cached_property
-    def _nearest_visible(self) -> KDTree:
-        return KDTree(self.visible)
+    def pickable(self) -> NDArray[np.float32]:
+        """(P, 3) visible vertices over which the picker reaches cloth that was seen [m]."""
+        nearest, _ = KDTree(self.seen).query(self.visible + ABOVE, distance_upper_bound=REACH_M)
+        pickable = self.visible[np.isfinite(nearest)]
+        if not len(pickable):
+            raise ReconstructionFailed("the mesh lies beside the cloth that was seen: no vertex of it can be picked")
+        return pickable
+
+    @cached_property
+    def seen(self) -> NDArray[np.float64]:
+        """(Q, 3) what the camera measured of the cloth [m]; without a mask, of everything."""
+        return self.surface(np.argwhere(self.measured)[:, ::-1])
+
+    @cached_property
+    def measured(self) -> NDArray[np.bool_]:
+        """(H, W) pixels with a depth, on the cloth where there is a mask."""
+        deep = self.view.depth > 0
+        return deep if self.view.mask is None else deep & self.view.mask
+
+    @cached_property
+    def _nearest_pickable(self) -> KDTree:
+        return KDTree(self.pickable)
 
     @cached_property
     def box(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -132,9 +155,9 @@ class Scene:
         return Candidates(picks, places[every, first]).where(fits[every, first])
 
     def snap(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Picker centres over the visible vertices nearest to points (N, 3)."""
-        _, nearest = self._nearest_visible.query(points)
-        return self.visible[nearest] + np.array([0, 0, PICKER_ABOVE_M], np.float32)
+        """Picker centres over the pickable vertices nearest to points (N, 3)."""
+        _, nearest = self._nearest_pickable.query(points)
+        return self.pickable[nearest] + ABOVE
 
     def surface(self, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
         """World points (N, 3) [m] seen at pixels (N, 2) = (u, v): on the cloth, or 5 mm over the table beside it."""
@@ -142,9 +165,8 @@ class Scene:
         columns, rows = pixels.T
         rays = np.c_[pixels + 0.5, np.ones(len(pixels))] @ (camera.T_world_camera[:3, :3] @ camera.K_inverse).T
         depth = self.view.depth[rows, columns]
-        measured = depth > 0 if self.view.mask is None else (depth > 0) & self.view.mask[rows, columns]
         to_table = (SURFACE_HEIGHT_M - camera.position[2]) / rays[:, 2]
-        return camera.position + rays * np.where(measured, depth, to_table)[:, None]
+        return camera.position + rays * np.where(self.measured[rows, columns], depth, to_table)[:, None]
 
 
 def pulls(count: int, tries: int, rng: np.random.Generator) -> NDArray[np.float32]:
