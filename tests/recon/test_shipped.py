@@ -87,25 +87,28 @@ MERGED = pytest.mark.xfail(reason="finetuning lays the layers of a flat skirt in
 @pytest.mark.parametrize(
     "category", [pytest.param(each, marks=MERGED) if each == "skirt" else each for each in CATEGORIES]
 )
-def test_what_counts_as_visible_of_a_garment_laid_flat_is(reconstructor, category):
+@pytest.mark.parametrize("method", ["medor", "isometric"])
+def test_what_counts_as_visible_of_a_garment_laid_flat_is(reconstructor, category, method):
     garment, positions, view = flat(category)
-    mesh = reconstructor.reconstruct(ReconstructRequest(view=view, category=category, method="isometric")).mesh
+    mesh = reconstructor.reconstruct(ReconstructRequest(view=view, category=category, method=method)).mesh
     error, constant = canonical_errors(mesh.canonical[mesh.visible], mesh.vertices[mesh.visible], garment, positions)
     assert error < 0.5 * constant
 
 
 @pytest.mark.parametrize("category", CATEGORIES)
-def test_a_garment_laid_flat_comes_back_in_its_place(reconstructor, category):
+@pytest.mark.parametrize("method", ["medor", "isometric"])
+def test_a_garment_laid_flat_comes_back_in_its_place(reconstructor, category, method):
     garment, positions, view = flat(category)
-    mesh = reconstructor.reconstruct(ReconstructRequest(view=view, category=category, method="isometric")).mesh
+    mesh = reconstructor.reconstruct(ReconstructRequest(view=view, category=category, method=method)).mesh
     assert misplaced(mesh, garment, positions) < 0.25
 
 
 @pytest.mark.parametrize("category", CATEGORIES)
-def test_a_crumpled_garment_comes_back_whole(reconstructor, category):
+@pytest.mark.parametrize("method", ["medor", "isometric"])
+def test_a_crumpled_garment_comes_back_whole(reconstructor, category, method):
     garment, positions = crumpled(category, SEED)
     seen = view_of(positions, garment.faces)
-    mesh = reconstructor.reconstruct(ReconstructRequest(view=seen, category=category, method="isometric")).mesh
+    mesh = reconstructor.reconstruct(ReconstructRequest(view=seen, category=category, method=method)).mesh
     assert 0.05 < mesh.visible.mean() < 0.95
     assert coverage(mesh.vertices, mesh.faces) == pytest.approx(coverage(positions, garment.faces), rel=0.3)
 

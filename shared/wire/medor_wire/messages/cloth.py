@@ -38,7 +38,7 @@ class ClothMesh(Message):
 class ReconstructRequest(Message):
     view: DepthView
     category: Category
-    method: str = "isometric"
+    method: str = "medor"
 
 
 class Reconstruction(Message):
