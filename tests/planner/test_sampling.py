@@ -165,6 +165,16 @@ def test_what_was_seen_ends_with_the_mask(scene):
     assert masked.pickable[:, 0].max() <= REACH_M < scene.pickable[:, 0].max()
 
 
+def test_depth_that_is_no_number_is_no_cloth(scene):
+    depth = scene.view.depth.copy()
+    depth[: len(depth) // 2] = np.inf
+    depth[0] = np.nan
+    broken = Scene(scene.mesh, scene.view.model_copy(update={"depth": depth}))
+    assert 0 < len(broken.seen) < len(scene.seen)
+    assert np.isfinite(broken.seen).all()
+    assert len(sample(broken, 50, rng(), reachable=every_pull)) == 50
+
+
 def test_the_random_policy_places_off_the_cloth(scene):
     for seed in range(20):
         action = random_action(scene, rng(seed), every_pull)

@@ -60,6 +60,7 @@ class Planner:
         Raises:
             BadRequest: unknown method, or another category on the table.
             OutOfReach: no candidate can be carried out.
+            ReconstructionFailed: recon found no mesh it trusts, or none of its vertices lies over cloth that was seen.
             Unavailable: a service that is needed does not answer.
         """
         method = method_named(request.method)

@@ -77,6 +77,7 @@ def sample(
 
     Raises:
         OutOfReach: not a single candidate was found.
+        ReconstructionFailed: the mesh has no vertex that can be picked.
     """
     found = NOTHING
     for _ in range(ROUNDS):
@@ -119,13 +120,15 @@ class Scene:
 
     @cached_property
     def seen(self) -> NDArray[np.float64]:
-        """(Q, 3) what the camera measured of the cloth [m]; without a mask, of everything."""
-        return self.surface(np.argwhere(self.measured)[:, ::-1])
+        """(Q, 3) what the camera measured in the box, of the cloth [m]; without a mask, of everything."""
+        low, high = self.box
+        boxed = self.measured[low[1] : high[1], low[0] : high[0]]
+        return self.surface(np.argwhere(boxed)[:, ::-1] + low)
 
     @cached_property
     def measured(self) -> NDArray[np.bool_]:
         """(H, W) pixels with a depth, on the cloth where there is a mask."""
-        deep = self.view.depth > 0
+        deep = (self.view.depth > 0) & np.isfinite(self.view.depth)
         return deep if self.view.mask is None else deep & self.view.mask
 
     @cached_property
