@@ -7,18 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from medor_cloth.alignment import canonical_cost
 from medor_cloth.camera import Camera, overhead
 from medor_cloth.coverage import coverage
 from medor_cloth.garment import Garment, generate
 from medor_cloth.goals import flattened, goal_set, solver_of
-from medor_cloth.picker import pick_place
+from medor_cloth.picker import GLANCE_FRAMES, pick_place
 from medor_cloth.raster import rasterize, visible_vertices
-from medor_cloth.solver import ClothState
+from medor_cloth.solver import ClothState, SolverConfig
 from medor_dynamics.flatten import Flattener
-from medor_dynamics.physics import Physics
+from medor_dynamics.learned import learned
+from medor_dynamics.physics import Physics, without_layers
 from medor_dynamics.roller import Roller
+from medor_dynamics.shipped import DEFAULT
 from medor_dynamics.warm_up import warm_up
 from medor_planner.episode import Episodes
 from medor_planner.executor import Executor
@@ -234,7 +237,12 @@ class Lab:
 
     def add_dynamics(self, id: str) -> None:
         member = self.join(id)
-        member.serve(endpoints.ROLLOUT, Roller({"physics": Physics(threads=1)}).roll_out)
+        backends = {
+            "physics": Physics(threads=1),
+            "layerless": Physics(threads=1, config=without_layers(SolverConfig()), settle_frames=GLANCE_FRAMES),
+            "learned": learned(DEFAULT, 1, torch.bfloat16),
+        }
+        member.serve(endpoints.ROLLOUT, Roller(backends).roll_out)
         member.serve(endpoints.FLATTEN, Flattener().flatten)
 
     def close(self) -> None:

@@ -21,11 +21,11 @@ def test_every_row_of_the_table_is_a_method(name):
 
 
 def test_methods_are_all_different():
-    assert len({(m.recon, m.dynamics, m.goals, m.visible_reward) for m in METHODS.values()}) == len(METHODS)
+    assert len({(m.recon, m.dynamics, m.goals, m.visible_reward, m.judged) for m in METHODS.values()}) == len(METHODS)
 
 
 def test_with_physics_differs_from_the_learned_method_in_dynamics_alone():
-    pairs = [(METHODS[name.removesuffix("+physics")], each) for name, each in METHODS.items() if "+" in name]
+    pairs = [(METHODS[name.removesuffix("+physics")], each) for name, each in METHODS.items() if "+physics" in name]
     assert {learned.name for learned, _ in pairs} >= {"medor", "partial-reward", "garmentnets"}
     for learned, physics in pairs:
         assert (learned.dynamics, physics.dynamics) == ("learned", "layerless")

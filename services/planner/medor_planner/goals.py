@@ -27,14 +27,17 @@ class Goals:
     def reward(self, method: Method, mesh: ClothMesh, cancel: threading.Event) -> Reward:
         """How states of `mesh` are scored by their distance to the goals of the method."""
         request = canonical_of(mesh) if method.goals == "mesh" else template(mesh.category)
-        arrays = (request.canonical, request.faces, request.panel_uv)
-        goal_set = self._flattened(ByContent.of((request, cancel), request.category, *arrays))
         return Reward(
             task="canonicalize",
-            goals=goal_set.goals,
+            goals=self.of(request, cancel).goals,
             matched=method.goals == "mesh",
             visible_only=method.visible_reward,
         )
+
+    def of(self, request: FlattenRequest, cancel: threading.Event) -> GoalSet:
+        """The goal poses of a canonical pose, and the coverage of the garment laid flat."""
+        arrays = (request.canonical, request.faces, request.panel_uv)
+        return self._flattened(ByContent.of((request, cancel), request.category, *arrays))
 
     def _flatten(self, asked: ByContent[tuple[FlattenRequest, threading.Event]]) -> GoalSet:
         request, cancel = asked.value

@@ -20,6 +20,8 @@ class Method:
     category, whose vertices do not correspond with the mesh."""
     visible_reward: bool = False
     """Whether hidden cloth is rolled out but does not count."""
+    judged: bool = False
+    """Whether several models are asked, the named one first, and a judge who has learnt what comes of it decides."""
 
     @property
     def with_physics(self) -> "Method":
@@ -42,13 +44,15 @@ COMPLETED = tuple(
 )
 """The mesh completed from the view, rolled out by the learned model; goals are made of its own canonical pose. First
 MEDOR, then the ablations of its reconstruction."""
+JUDGED = Method("medor+judge", recon="medor", dynamics="layerless", goals="mesh", judged=True)
+"""The completed mesh, rolled out by the cloth solver, on lengths kept, and by the learned model; the judge decides."""
 PARTIAL_REWARD = replace(COMPLETED[0], name="partial-reward", visible_reward=True)
 """MEDOR, judging only what it saw (MEDOR, ablations)."""
 LEARNED = (*COMPLETED, PARTIAL_REWARD)
 
 METHODS = {
     method.name: method
-    for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM, *LEARNED, *(each.with_physics for each in LEARNED))
+    for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM, JUDGED, *LEARNED, *(each.with_physics for each in LEARNED))
 }
 """All by name. `+physics`: the same with the cloth solver, MEDOR's ground-truth dynamics."""
 

@@ -3,10 +3,14 @@
 Plans run beside each other; actions and episodes one at a time, since there is one robot.
 """
 
+from functools import partial
+from pathlib import Path
+
 from pydantic import Field
 
 from medor_planner.episode import Episodes
 from medor_planner.executor import Executor
+from medor_planner.judge.judge import SHIPPED, Judge
 from medor_planner.planner import Planner
 from medor_planner.plans import Plans
 from medor_planner.screening import BACKEND, KEEP, Screening
@@ -26,12 +30,16 @@ class Config(Settings, section="planner"):
     """Dynamics backend that chooses the candidates that are rolled out; empty: none, all are."""
     keep: float = Field(default=KEEP, gt=0, le=1)
     """Share of the candidates that screening leaves."""
+    judge: Path = SHIPPED
+    """Folder of the judge's weights, as `python -m medor_planner.judge.train` leaves it."""
 
 
 def main(config: Config) -> None:
     with join("planner", config.bus) as bus:
         plans = Plans(config.keep_plans)
-        planner = Planner(bus, plans, config.chunk, Screening(config.screen, config.keep))
+        planner = Planner(
+            bus, plans, config.chunk, Screening(config.screen, config.keep), partial(Judge.load, config.judge)
+        )
         executor = Executor(bus, plans)
         bus.serve(endpoints.PLAN, planner.plan, workers=config.plans_at_once)
         bus.serve(endpoints.EXECUTE, executor.execute)

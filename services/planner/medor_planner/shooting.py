@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from medor_wire import endpoints
 from medor_wire.bus import Bus, Instance
 from medor_wire.errors import Busy, Cancelled, InternalError, MedorError, Unavailable
-from medor_wire.messages import Message, RolloutProgress, RolloutRequest
+from medor_wire.messages import Message, RolloutProgress, RolloutRequest, Rollouts
 
 log = logging.getLogger(__name__)
 
@@ -45,13 +45,17 @@ class Shooting:
         self._waiting = deque(range(len(self._chunks)))
         self._running: Counter[int] = Counter()
         self._done = np.zeros(len(self._chunks), np.int64)
-        self._rewards: dict[int, NDArray[np.float64]] = {}
+        self._replies: dict[int, Rollouts] = {}
         self._failure: BaseException | None = None
         self._stop = threading.Event()
         self._changed = threading.Condition()
 
     def rewards(self, on_fraction: Callable[[float], None]) -> NDArray[np.float64]:
-        """(K,) rewards of all candidates, in their order.
+        """(K,) rewards of all candidates, in their order; raises what `rollouts` does."""
+        return self.rollouts(on_fraction)[1]
+
+    def rollouts(self, on_fraction: Callable[[float], None]) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Final vertices (K, V, 3) [m] and rewards (K,) of all candidates, in their order.
 
         Args:
             on_fraction: told the share of candidates rolled out, as it grows.
@@ -68,7 +72,8 @@ class Shooting:
             self._stop.set()
             with self._changed:
                 self._changed.notify_all()
-        return np.concatenate([self._rewards[i] for i in range(len(self._chunks))])
+        replies = [self._replies[i] for i in range(len(self._chunks))]
+        return np.concatenate([it.positions for it in replies]), np.concatenate([it.rewards for it in replies])
 
     def _watch(self, workers: dict[Instance, threading.Thread], on_fraction: Callable[[float], None]) -> None:
         last_worked = -math.inf
@@ -83,7 +88,7 @@ class Shooting:
             if at_work:
                 last_worked = time.monotonic()
             elif not self._finished and time.monotonic() - last_worked > GRACE_S:
-                raise Unavailable(f"no dynamics instance left, {len(self._rewards)} of {len(self._chunks)} chunks done")
+                raise Unavailable(f"no dynamics instance left, {len(self._replies)} of {len(self._chunks)} chunks done")
             with self._changed:
                 self._changed.wait(0.05)
                 done = int(self._done.sum())
@@ -93,7 +98,7 @@ class Shooting:
 
     @property
     def _finished(self) -> bool:
-        return len(self._rewards) == len(self._chunks)
+        return len(self._replies) == len(self._chunks)
 
     def _hire(self, workers: dict[Instance, threading.Thread]) -> None:
         for instance in self._bus.instances(endpoints.ROLLOUT.service):
@@ -124,7 +129,7 @@ class Shooting:
                 log.exception("rollout of a chunk")
                 self._fail(InternalError(f"{type(defect).__name__}: {defect}"))
 
-    def _ask(self, instance: Instance, index: int) -> NDArray[np.float64]:
+    def _ask(self, instance: Instance, index: int) -> Rollouts:
         chunk = self._chunks[index]
         request = self._request.model_copy(
             update={"picks": self._request.picks[chunk], "places": self._request.places[chunk]}
@@ -134,14 +139,13 @@ class Shooting:
             if isinstance(progress, RolloutProgress):
                 self._progress(index, progress.done)
 
-        reply = self._bus.ask(
+        return self._bus.ask(
             endpoints.ROLLOUT,
             request,
             instance=instance,
             cancel=self._stop,
             on_progress=tell,
         )
-        return reply.rewards
 
     def _take(self) -> int | None:
         """A chunk nobody has begun, else one that others are at work on."""
@@ -154,13 +158,13 @@ class Shooting:
 
     def _most_awaited(self) -> int:
         """The unanswered chunk with the fewest instances at work on it, of these the least advanced."""
-        unanswered = (index for index in range(len(self._chunks)) if index not in self._rewards)
+        unanswered = (index for index in range(len(self._chunks)) if index not in self._replies)
         return min(unanswered, key=lambda index: (self._running[index], self._done[index]))
 
     def _give_back(self, index: int) -> None:
         with self._changed:
             self._running[index] -= 1
-            if not self._running[index] and index not in self._rewards:
+            if not self._running[index] and index not in self._replies:
                 self._done[index] = 0
                 self._waiting.appendleft(index)
             self._changed.notify_all()
@@ -170,11 +174,11 @@ class Shooting:
             self._done[index] = max(self._done[index], done)
             self._changed.notify_all()
 
-    def _finish(self, index: int, rewards: NDArray[np.float64]) -> None:
+    def _finish(self, index: int, reply: Rollouts) -> None:
         with self._changed:
             self._running[index] -= 1
-            self._rewards.setdefault(index, rewards)
-            self._done[index] = len(rewards)
+            self._replies.setdefault(index, reply)
+            self._done[index] = len(reply.rewards)
             self._changed.notify_all()
 
     def _fail(self, failure: BaseException) -> None:

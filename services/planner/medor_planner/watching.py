@@ -12,7 +12,7 @@ from medor_wire.messages import PlanProgress
 
 POLL_S = 0.05
 
-Stage = Literal["capture", "reconstruct", "goals", "sample", "screen", "rollout"]
+Stage = Literal["capture", "reconstruct", "goals", "sample", "screen", "rollout", "judge"]
 
 
 class Stages:

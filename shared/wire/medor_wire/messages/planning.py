@@ -30,7 +30,7 @@ class PlanRequest(Message):
 
 
 class PlanProgress(Message):
-    stage: Literal["capture", "reconstruct", "goals", "sample", "screen", "rollout"]
+    stage: Literal["capture", "reconstruct", "goals", "sample", "screen", "rollout", "judge"]
     fraction: float
 
 

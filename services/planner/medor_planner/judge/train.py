@@ -1,0 +1,266 @@
+"""Teach the judge: `python -m medor_planner.judge.train --data data/judge --out runs/judge`.
+
+A minute or two on one core. First every garment is judged by networks that have not seen it (cross-validation over
+garments): how well they rank, and what their favourite among a state's candidates brings, beside each model's
+favourite. Then networks are taught on all garments and written. Needs torch: `pip install medor-planner[train]`.
+"""
+
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import tyro
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+from scipy.stats import rankdata
+from torch import Tensor, nn
+
+from medor_learn import weights
+from medor_learn.revision import revision
+from medor_planner.judge.features import features
+from medor_planner.judge.judge import LIMIT, TASKS
+from medor_planner.judge.opinions import OPINIONS
+from medor_planner.judge.situation import Outcomes, load
+
+UNIT = (0.05, 0.008)
+"""Typical gains: share of the flat coverage, metres of canonical cost."""
+LOST_M = 0.1
+"""Canonical cost of a vertex that leaves the picture, on top of its own [m]."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to learn."""
+
+    data: Path
+    """Folder that `medor_planner.judge.collect` filled; all files below it."""
+    out: Path
+    members: int = 8
+    """Networks that are averaged."""
+    hidden: int = 64
+    epochs: int = 40
+    batch: int = 128
+    lr: float = 2e-3
+    decay: float = 0.1
+    dropout: float = 0.3
+    noise: float = 0.05
+    """On the features, in standard deviations."""
+    folds: int = 6
+    """Of the cross-validation; 0: none."""
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """All candidates of all states.
+
+    Attributes:
+        names: (F) features.
+        values: (N, F).
+        gains: (N, 2) share of the flat coverage, metres of canonical cost; what has left the picture is lost.
+        state: (N,) number of the state.
+        garment: (N,) seed of the garment.
+    """
+
+    names: tuple[str, ...]
+    values: NDArray[np.float32]
+    gains: NDArray[np.float32]
+    state: NDArray[np.int64]
+    garment: NDArray[np.int64]
+
+    @classmethod
+    def read(cls, folder: Path) -> "Lessons":
+        paths = sorted(folder.rglob("*.npz"))
+        if not paths:
+            raise SystemExit(f"{folder}: no states; collect some with `python -m medor_planner.judge.collect`")
+        names: tuple[str, ...] = ()
+        rows, gains, garment = [], [], []
+        for path in track(paths, "features", console=Console(stderr=True), transient=True):
+            situation, outcomes = load(path)
+            names, values = features(situation)
+            rows.append(values)
+            gains.append(gained(outcomes))
+            garment.append(np.full(len(values), outcomes.seed))
+        state = np.repeat(np.arange(len(rows)), [len(values) for values in rows])
+        return cls(names, np.concatenate(rows), np.concatenate(gains), state, np.concatenate(garment))
+
+
+def gained(outcomes: Outcomes) -> NDArray[np.float32]:
+    """(K, 2) what the candidates brought."""
+    covered = outcomes.coverage_m2 * outcomes.in_view / outcomes.flat_coverage_m2
+    cost = outcomes.cost_m + LOST_M * (1 - outcomes.in_view)
+    return np.stack([covered[1:] - covered[0], cost[0] - cost[1:]], axis=1).astype(np.float32)
+
+
+class Ensemble(nn.Module):
+    """The networks, with what normalises their features; named as `judge.Judge` reads them."""
+
+    mean: Tensor
+    scale: Tensor
+    unit: Tensor
+
+    def __init__(self, features: int, options: Options) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(features))
+        self.register_buffer("scale", torch.ones(features))
+        self.register_buffer("unit", torch.tensor(UNIT))
+        hidden, drop = options.hidden, options.dropout
+        self.members = nn.ModuleList(
+            nn.Sequential(
+                nn.Linear(features, hidden), nn.SiLU(), nn.Dropout(drop),
+                nn.Linear(hidden, hidden), nn.SiLU(), nn.Dropout(drop),
+                nn.Linear(hidden, len(TASKS)),
+            )
+            for _ in range(options.members)
+        )  # fmt: skip
+
+    def normalized(self, values: Tensor) -> Tensor:
+        return ((values - self.mean) / self.scale).clamp(-LIMIT, LIMIT)
+
+    def forward(self, values: Tensor) -> Tensor:
+        """(N, 2) expected gains of features (N, F)."""
+        inputs = self.normalized(values)
+        return torch.stack([member(inputs) for member in self.members]).mean(0) * self.unit
+
+
+def taught(values: NDArray[np.float32], gains: NDArray[np.float32], options: Options) -> Ensemble:
+    """Networks that have learnt from candidates (N, F) and what they brought (N, 2)."""
+    torch.manual_seed(options.seed)
+    ensemble = Ensemble(values.shape[1], options)
+    ensemble.mean.copy_(torch.from_numpy(values.mean(axis=0)))
+    ensemble.scale.copy_(torch.from_numpy(values.std(axis=0) + 1e-6))
+    inputs, targets = ensemble.normalized(torch.from_numpy(values)), torch.from_numpy(gains) / ensemble.unit
+    for member in ensemble.members:
+        _teach(member, inputs, targets, options)
+    return ensemble.eval()
+
+
+def _teach(member: nn.Module, inputs: Tensor, targets: Tensor, options: Options) -> None:
+    batches = max(len(inputs) // options.batch, 1)
+    optimizer = torch.optim.AdamW(member.parameters(), lr=options.lr, weight_decay=options.decay)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, options.lr, total_steps=options.epochs * batches)
+    for _ in range(options.epochs):
+        for rows in torch.randperm(len(inputs))[: batches * options.batch].view(batches, -1):
+            noisy = inputs[rows] + options.noise * torch.randn(len(rows), inputs.shape[1])
+            loss = nn.functional.smooth_l1_loss(member(noisy), targets[rows])
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+            schedule.step()
+
+
+def judged_unseen(data: Lessons, options: Options) -> NDArray[np.float32]:
+    """(N, 2) expected gains of every garment's candidates, by networks taught on other garments."""
+    fold = np.random.default_rng(options.seed).permutation(np.unique(data.garment))
+    fold_of = dict(zip(fold.tolist(), (np.arange(len(fold)) % options.folds).tolist(), strict=True))
+    part = np.array([fold_of[seed] for seed in data.garment.tolist()])
+    found = np.empty_like(data.gains)
+    for k in track(range(options.folds), "cross-validation", console=Console(stderr=True), transient=True):
+        test = part == k
+        ensemble = taught(data.values[~test], data.gains[~test], options)
+        with torch.no_grad():
+            found[test] = ensemble(torch.from_numpy(data.values[test])).numpy()
+    return found
+
+
+@dataclass(frozen=True)
+class Merit:
+    """How well something rates the candidates of a state, mean over states.
+
+    Attributes:
+        rank: Spearman correlation with what they brought.
+        gain: what its favourite brought, 0 where it likes nothing better than doing nothing.
+        error: standard error of that.
+    """
+
+    rank: float
+    gain: float
+    error: float
+
+
+def merit(ratings: NDArray, gains: NDArray, state: NDArray[np.int64]) -> Merit:
+    """Of ratings (N,), where 0 is doing nothing."""
+    ranks, favourites = [], []
+    for one in np.unique(state):
+        rated, brought = ratings[state == one], gains[state == one]
+        differ = np.ptp(rated) > 0 and np.ptp(brought) > 0
+        ranks.append(np.corrcoef(rankdata(rated), rankdata(brought))[0, 1] if differ else 0.0)
+        favourites.append(brought[rated.argmax()] if rated.max() > 0 else 0.0)
+    return Merit(
+        round(float(np.mean(ranks)), 4),
+        round(float(np.mean(favourites)), 5),
+        round(float(np.std(favourites)) / len(favourites) ** 0.5, 5),
+    )
+
+
+def compared(data: Lessons, unseen: NDArray[np.float32]) -> dict[str, dict[str, Merit]]:
+    """By task: the judge's merit, each model's, and that of knowing."""
+    found: dict[str, dict[str, Merit]] = {}
+    for column, (task, said) in enumerate(zip(TASKS, ("gain", "nearer"), strict=True)):
+        gains = data.gains[:, column]
+        ratings = {"judge": unseen[:, column]}
+        for letter, opinion in zip("abcdefgh", OPINIONS, strict=False):
+            name = f"{opinion.recon}, {opinion.backend}"
+            ratings[name] = data.values[:, data.names.index(f"{letter}_{said}")]
+        ratings["the outcome itself"] = gains
+        found[task] = {name: merit(rating, gains, data.state) for name, rating in ratings.items()}
+    return found
+
+
+def table(found: dict[str, dict[str, Merit]]) -> Table:
+    out = Table("task", "rated by", "rank correlation", "its favourite brings")
+    for task, merits in found.items():
+        for name, one in merits.items():
+            out.add_row(task, name, f"{one.rank:.3f}", f"{one.gain:.4f} ± {one.error:.4f}")
+    return out
+
+
+def main(options: Options) -> None:
+    torch.set_num_threads(1)
+    data = Lessons.read(options.data)
+    metrics: dict[str, Any] = {}
+    if options.folds:
+        found = compared(data, judged_unseen(data, options))
+        Console().print(table(found))
+        metrics = {task: {name: asdict(one) for name, one in merits.items()} for task, merits in found.items()}
+    ensemble = taught(data.values, data.gains, options)
+    write(ensemble, data, metrics, options)
+    sys.stdout.write(
+        f"{options.out}: taught on {data.state[-1] + 1} states of {len(np.unique(data.garment))} garments\n"
+    )
+
+
+def write(ensemble: Ensemble, data: Lessons, metrics: dict[str, Any], options: Options) -> None:
+    """The folder that `Judge.load` reads."""
+    schedule = {name: value for name, value in asdict(options).items() if name not in ("data", "out")}
+    config = {
+        "features": list(data.names),
+        "members": options.members,
+        "layers": sorted({int(name.split(".")[2]) for name in ensemble.state_dict() if name.startswith("members.")}),
+        "data": {
+            "states": int(data.state[-1]) + 1,
+            "candidates": len(data.state),
+            "garment_seeds": [int(data.garment.min()), int(data.garment.max())],
+        },
+        "schedule": schedule,
+        "metrics": metrics,
+        "revision": revision(),
+    }
+    card = {
+        "What it is": "Rates pick-and-place candidates: the gain in coverage and in closeness to the canonical pose to "
+        "expect of each, from what several models foresee and what the camera sees.",
+        "Data": config["data"],
+        "Schedule": schedule,
+        "Metrics": metrics,
+        "Revision": str(config["revision"]),
+    }
+    weights.save(options.out, ensemble, config, card)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options, description=__doc__))

@@ -1,0 +1,202 @@
+"""The judge: told what models foresee and what is seen, says what an action will bring."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from medor_cloth.camera import Camera
+from medor_planner.judge import situation as stored
+from medor_planner.judge.features import features
+from medor_planner.judge.judge import Judge
+from medor_planner.judge.relief import CELL_M, Relief
+from medor_planner.judge.situation import Foreseen, Outcomes, Situation
+from medor_planner.judge.train import Lessons, Options, gained, judged_unseen, merit, taught, write
+from medor_planner.sampling import Candidates, Scene, anywhere, sample
+from medor_wire import endpoints
+from medor_wire.errors import BadRequest, NoGarment
+from medor_wire.messages import CameraInfo, DepthView, GoalSet, PlanRequest
+
+COUNT = 12
+
+
+@pytest.fixture
+def situation(sheet_scene: Callable[..., Scene]) -> Situation:
+    """A sheet with one side folded over. The models foresee that all of it goes with the pull, more or less."""
+    scene = sheet_scene(folded=True)
+    flat = sheet_scene().mesh.vertices
+    rng = np.random.default_rng(0)
+    uneven = rng.normal(0, 5e-4, flat.shape).astype(np.float32)  # no two vertices just as far apart as a threshold
+    mesh = scene.mesh.model_copy(
+        update={
+            "vertices": scene.mesh.vertices + uneven,
+            "canonical": flat,
+            "confidence": np.linspace(0, 1, len(flat), dtype="f4"),
+        }
+    )
+    candidates = sample(scene, COUNT, rng, reachable=lambda picks, places: anywhere(picks))
+    pulls = np.concatenate([np.zeros((1, 3)), candidates.places - candidates.picks]).astype(np.float32)
+    share = np.linspace(0, 1, len(flat), dtype=np.float32)[:, None]
+    foreseen = tuple(Foreseen(mesh, mesh.vertices + part * share * pulls[:, None]) for part in (1.0, 0.5, 0.2))
+    return Situation(scene.view, candidates, GoalSet(goals=flat[None], flat_coverage_m2=0.048), foreseen)
+
+
+def turned(situation: Situation, heading: float, shift: tuple[float, float]) -> Situation:
+    """The same decision elsewhere: table, cloth and camera together."""
+    T = np.eye(4)
+    T[:2, :2] = [[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]]
+    T[:2, 3] = shift
+
+    def move(points: np.ndarray) -> np.ndarray:
+        return (points @ T[:3, :3].T + T[:3, 3]).astype(np.float32)
+
+    info = situation.view.camera
+    camera = info.model_copy(update={"T_world_camera": T @ info.T_world_camera})
+    return Situation(
+        situation.view.model_copy(update={"camera": camera}),
+        Candidates(move(situation.candidates.picks), move(situation.candidates.places)),
+        situation.goals.model_copy(update={"goals": move(situation.goals.goals)}),
+        tuple(
+            Foreseen(one.mesh.model_copy(update={"vertices": move(one.mesh.vertices)}), move(one.positions))
+            for one in situation.foreseen
+        ),
+    )
+
+
+def test_a_relief_measures_what_is_seen(sheet_scene, camera):
+    relief = Relief.of(sheet_scene().view, camera)
+    assert relief.area_m2 == pytest.approx(0.2 * 0.24, rel=0.04)
+    assert relief.at(relief.heights, np.zeros(2)) == pytest.approx(0.005, abs=5e-4)
+    assert relief.at(relief.inside, np.zeros(2)) == pytest.approx(0.1, abs=2 * CELL_M)
+    assert relief.at(relief.outside, np.array([0.15, 0])) == pytest.approx(0.05, abs=2 * CELL_M)
+    assert relief.rim_m == pytest.approx(0.538 / 2 - 0.12, abs=0.005)
+
+
+def test_a_relief_of_nothing_is_refused(camera: Camera):
+    info = CameraInfo(K=camera.K, T_world_camera=camera.T_world_camera, width=camera.width, height=camera.height)
+    with pytest.raises(NoGarment):
+        Relief.of(DepthView(depth=np.zeros((240, 240), np.float32), camera=info), camera)
+
+
+def test_features_do_not_depend_on_where_the_garment_lies_nor_how_it_is_turned(situation):
+    names, here = features(situation)
+    for heading, shift in ((np.pi / 2, (0.0, 0.0)), (0.0, (0.1, -0.07)), (2.0, (0.03, 0.05))):
+        _, there = features(turned(situation, heading, shift))
+        heights = np.array(["height_" in name for name in names])  # read off cells, which an edge may fall between
+        near = np.isclose(here, there, atol=0.02)
+        assert near[:, ~heights].all(), [names[i] for i in np.flatnonzero((~near & ~heights).any(axis=0))]
+        assert near[:, heights].mean() > 0.9
+
+
+def test_each_candidate_has_features_of_its_own(situation):
+    order = np.random.default_rng(1).permutation(COUNT)
+    some = situation.candidates
+    other = replace(
+        situation,
+        candidates=Candidates(some.picks[order], some.places[order]),
+        foreseen=tuple(replace(one, positions=one.positions[[0, *(order + 1)]]) for one in situation.foreseen),
+    )
+    np.testing.assert_allclose(features(other)[1], features(situation)[1][order], atol=1e-5)
+
+
+def test_a_rollout_that_diverged_counts_as_nothing_moved(situation):
+    first = situation.foreseen[0]
+    first.positions[3] = np.nan
+    names, values = features(situation)
+    assert np.isfinite(values).all()
+    assert values[2, names.index("a_moved_mean")] == 0
+
+
+def test_what_is_stored_comes_back(situation, tmp_path):
+    outcomes = Outcomes(np.arange(13.0), np.arange(13.0) / 100, np.ones(13), 0.05, 7)
+    stored.save(tmp_path / "one.npz", situation, outcomes)
+    again, told = stored.load(tmp_path / "one.npz")
+    assert (told.seed, told.flat_coverage_m2) == (7, 0.05)
+    np.testing.assert_array_equal(told.cost_m, outcomes.cost_m)
+    np.testing.assert_allclose(features(again)[1], features(situation)[1], atol=0.02)
+
+
+def test_cloth_that_leaves_the_picture_is_no_gain():
+    kept = gained(Outcomes(np.array([0.02, 0.03]), np.array([0.06, 0.04]), np.array([1.0, 1.0]), 0.04, 0))
+    lost = gained(Outcomes(np.array([0.02, 0.03]), np.array([0.06, 0.04]), np.array([1.0, 0.5]), 0.04, 0))
+    np.testing.assert_allclose(kept, [[0.25, 0.02]], atol=1e-6)
+    np.testing.assert_allclose(lost, [[-0.125, -0.03]], atol=1e-6)
+
+
+def lessons(states: int) -> Lessons:
+    """The third feature tells the gain of coverage, the fourth that of the cost; ten candidates a state."""
+    values = np.random.default_rng(0).normal(size=(10 * states, 6)).astype(np.float32)
+    gains = values[:, 2:4] * [0.05, 0.008] + [0.01, 0]
+    state = np.repeat(np.arange(states), 10)
+    return Lessons(tuple("uvwxyz"), values, gains.astype(np.float32), state, state // 2)
+
+
+def options(folder: Path, **given) -> Options:
+    return Options(data=folder, out=folder / "judge", **{"members": 2, "epochs": 30, "folds": 3, **given})
+
+
+def test_networks_overfit_one_batch(tmp_path):
+    data = lessons(13)
+    gains = np.random.default_rng(1).normal(size=data.gains.shape).astype(np.float32) * [0.05, 0.008]
+    ensemble = taught(data.values, gains, options(tmp_path, epochs=1500, dropout=0, noise=0, decay=0, members=1))
+    with torch.no_grad():
+        off = ensemble(torch.from_numpy(data.values)).numpy() - gains
+    assert np.sqrt((off**2).mean(axis=0)) == pytest.approx([0, 0], abs=0.01)
+
+
+def test_what_can_be_learnt_is_known_of_unseen_garments(tmp_path):
+    data = lessons(60)
+    unseen = judged_unseen(data, options(tmp_path))
+    for column in (0, 1):
+        found = merit(unseen[:, column], data.gains[:, column], data.state)
+        best = merit(data.gains[:, column], data.gains[:, column], data.state)
+        assert best.rank == pytest.approx(1)
+        assert found.rank > 0.9
+        assert found.gain > 0.9 * best.gain
+
+
+def test_what_was_taught_is_what_plans_use(tmp_path):
+    data, taught_so = lessons(20), options(tmp_path)
+    ensemble = taught(data.values, data.gains, taught_so)
+    write(ensemble, data, {}, taught_so)
+    with torch.no_grad():
+        expected = ensemble(torch.from_numpy(data.values)).numpy()
+    judge = Judge.load(tmp_path / "judge")
+    assert judge.names == data.names
+    np.testing.assert_allclose(judge.expected(data.values), expected, atol=1e-6)
+
+
+def test_a_judge_that_knows_other_features_does_not_decide(tmp_path, situation):
+    data, taught_so = lessons(20), options(tmp_path, epochs=1)
+    write(taught(data.values, data.gains, taught_so), data, {}, taught_so)
+    with pytest.raises(BadRequest, match="other features"):
+        Judge.load(tmp_path / "judge").rated(situation, "flatten")
+
+
+def test_without_weights_the_command_that_makes_them_is_named(tmp_path):
+    with pytest.raises(BadRequest, match=r"medor_planner\.judge\.train"):
+        Judge.load(tmp_path)
+
+
+@pytest.mark.parametrize("task", ["flatten", "canonicalize"])
+def test_the_shipped_judge_rates_in_the_units_of_the_task(situation, task):
+    rewards, now = Judge.load().rated(situation, task)
+    assert rewards.shape == (COUNT,)
+    if task == "flatten":
+        assert now == pytest.approx(Relief.of(situation.view, situation.camera).area_m2)
+        assert (np.abs(rewards - now) < situation.goals.flat_coverage_m2).all()
+    else:
+        assert now == pytest.approx(-features(situation)[1][0, features(situation)[0].index("a_unmoved_cost")])
+        assert (np.abs(rewards - now) < 0.1).all()
+
+
+def test_a_judged_plan_hears_all_models_and_is_the_same_again(lab):
+    asked = PlanRequest(category="tshirt", method="medor+judge", candidates=6, seed=3)
+    one, two = (lab.bus.ask(endpoints.PLAN, asked) for _ in range(2))
+    assert {"reconstruct", "rollout", "judge"} <= set(one.timings_ms)
+    assert len(one.top_rewards) == 6
+    np.testing.assert_array_equal(one.top_rewards, two.top_rewards)
+    assert one.no_op == (one.top_rewards.max() <= one.no_op_reward)
