@@ -17,10 +17,11 @@ from medor_cloth.goals import flattened, goal_set, solver_of
 from medor_cloth.picker import GLANCE_FRAMES, pick_place
 from medor_cloth.raster import rasterize, visible_vertices
 from medor_cloth.solver import ClothState, SolverConfig
+from medor_dynamics.coarse import Coarse
 from medor_dynamics.flatten import Flattener
 from medor_dynamics.learned import learned
 from medor_dynamics.physics import Physics, without_layers
-from medor_dynamics.roller import Roller
+from medor_dynamics.roller import Backend, Roller
 from medor_dynamics.shipped import DEFAULT
 from medor_dynamics.warm_up import warm_up
 from medor_planner.episode import Episodes
@@ -216,8 +217,9 @@ def cell(tshirt: Garment, camera: Camera, tmp_path: Path) -> Iterator[Cell]:
 class Lab:
     """Every service on one in-process bus."""
 
-    def __init__(self, cell: Cell, *, referee: bool = True) -> None:
+    def __init__(self, cell: Cell, *, referee: bool = True, **backends: Backend) -> None:
         self.cell = cell
+        self.backends = {"physics": Physics(threads=1), **backends}
         self.bus = LocalBus("asker")
         self.members: dict[str, LocalBus] = {}
         cell.serve(self.join("robot-1"), referee=referee)
@@ -237,12 +239,7 @@ class Lab:
 
     def add_dynamics(self, id: str) -> None:
         member = self.join(id)
-        backends = {
-            "physics": Physics(threads=1),
-            "layerless": Physics(threads=1, config=without_layers(SolverConfig()), settle_frames=GLANCE_FRAMES),
-            "learned": learned(DEFAULT, 1, torch.bfloat16),
-        }
-        member.serve(endpoints.ROLLOUT, Roller(backends).roll_out)
+        member.serve(endpoints.ROLLOUT, Roller(self.backends).roll_out)
         member.serve(endpoints.FLATTEN, Flattener().flatten)
 
     def close(self) -> None:
@@ -256,6 +253,19 @@ class Lab:
 @pytest.fixture
 def lab(cell: Cell) -> Iterator[Lab]:
     lab = Lab(cell)
+    yield lab
+    lab.close()
+
+
+@pytest.fixture
+def full_lab(cell: Cell) -> Iterator[Lab]:
+    """With every dynamics backend."""
+    lab = Lab(
+        cell,
+        layerless=Physics(threads=1, config=without_layers(SolverConfig()), settle_frames=GLANCE_FRAMES),
+        coarse=Coarse(threads=1),
+        learned=learned(DEFAULT, 1, torch.bfloat16),
+    )
     yield lab
     lab.close()
 

@@ -11,14 +11,15 @@ import torch
 from medor_cloth.camera import Camera
 from medor_planner.judge import situation as stored
 from medor_planner.judge.features import features
-from medor_planner.judge.judge import Judge
+from medor_planner.judge.judge import ALL, JUDGES, Judge
+from medor_planner.judge.opinions import COARSE, OPINIONS
 from medor_planner.judge.relief import CELL_M, Relief
 from medor_planner.judge.situation import Foreseen, Outcomes, Situation
 from medor_planner.judge.train import Lessons, Options, gained, judged_unseen, merit, taught, write
 from medor_planner.sampling import Candidates, Scene, anywhere, sample
 from medor_wire import endpoints
 from medor_wire.errors import BadRequest, NoGarment
-from medor_wire.messages import CameraInfo, DepthView, GoalSet, PlanRequest
+from medor_wire.messages import CameraInfo, ClothMesh, DepthView, GoalSet, PlanRequest
 
 COUNT = 12
 
@@ -40,8 +41,11 @@ def situation(sheet_scene: Callable[..., Scene]) -> Situation:
     candidates = sample(scene, COUNT, rng, reachable=lambda picks, places: anywhere(picks))
     pulls = np.concatenate([np.zeros((1, 3)), candidates.places - candidates.picks]).astype(np.float32)
     share = np.linspace(0, 1, len(flat), dtype=np.float32)[:, None]
-    foreseen = tuple(Foreseen(mesh, mesh.vertices + part * share * pulls[:, None]) for part in (1.0, 0.5, 0.2))
-    return Situation(scene.view, candidates, GoalSet(goals=flat[None], flat_coverage_m2=0.048), foreseen)
+    foreseen = {
+        opinion.name: Foreseen(mesh, (mesh.vertices + part * share * pulls[:, None]).astype(np.float32))
+        for opinion, part in zip(OPINIONS, (1.0, 0.5, 0.2, 0.8), strict=True)
+    }
+    return Situation(scene.view, mesh, candidates, GoalSet(goals=flat[None], flat_coverage_m2=0.048), foreseen)
 
 
 def turned(situation: Situation, heading: float, shift: tuple[float, float]) -> Situation:
@@ -53,16 +57,17 @@ def turned(situation: Situation, heading: float, shift: tuple[float, float]) -> 
     def move(points: np.ndarray) -> np.ndarray:
         return (points @ T[:3, :3].T + T[:3, 3]).astype(np.float32)
 
+    def lying(mesh: ClothMesh) -> ClothMesh:
+        return mesh.model_copy(update={"vertices": move(mesh.vertices)})
+
     info = situation.view.camera
     camera = info.model_copy(update={"T_world_camera": T @ info.T_world_camera})
     return Situation(
         situation.view.model_copy(update={"camera": camera}),
+        lying(situation.mesh),
         Candidates(move(situation.candidates.picks), move(situation.candidates.places)),
         situation.goals.model_copy(update={"goals": move(situation.goals.goals)}),
-        tuple(
-            Foreseen(one.mesh.model_copy(update={"vertices": move(one.mesh.vertices)}), move(one.positions))
-            for one in situation.foreseen
-        ),
+        {name: Foreseen(lying(one.mesh), move(one.positions)) for name, one in situation.foreseen.items()},
     )
 
 
@@ -97,17 +102,18 @@ def test_each_candidate_has_features_of_its_own(situation):
     other = replace(
         situation,
         candidates=Candidates(some.picks[order], some.places[order]),
-        foreseen=tuple(replace(one, positions=one.positions[[0, *(order + 1)]]) for one in situation.foreseen),
+        foreseen={
+            name: replace(one, positions=one.positions[[0, *(order + 1)]]) for name, one in situation.foreseen.items()
+        },
     )
     np.testing.assert_allclose(features(other)[1], features(situation)[1][order], atol=1e-5)
 
 
 def test_a_rollout_that_diverged_counts_as_nothing_moved(situation):
-    first = situation.foreseen[0]
-    first.positions[3] = np.nan
+    situation.foreseen[OPINIONS[0].name].positions[3] = np.nan
     names, values = features(situation)
     assert np.isfinite(values).all()
-    assert values[2, names.index("a_moved_mean")] == 0
+    assert values[2, names.index(f"{OPINIONS[0].name} moved_mean")] == 0
 
 
 def test_what_is_stored_comes_back(situation, tmp_path):
@@ -117,6 +123,17 @@ def test_what_is_stored_comes_back(situation, tmp_path):
     assert (told.seed, told.flat_coverage_m2) == (7, 0.05)
     np.testing.assert_array_equal(told.cost_m, outcomes.cost_m)
     np.testing.assert_allclose(features(again)[1], features(situation)[1], atol=0.02)
+
+
+def test_of_some_candidates_only_those_are_told(situation):
+    chosen = np.arange(COUNT) % 3 == 0
+    np.testing.assert_allclose(features(situation.among(chosen))[1], features(situation)[1][chosen], atol=1e-6)
+
+
+def test_an_opinion_that_is_not_heard_is_no_feature(situation):
+    names, _ = features(situation.heard([COARSE.name]))
+    assert any(name.startswith(COARSE.name) for name in names)
+    assert not any(name.startswith(OPINIONS[0].name) for name in names)
 
 
 def test_cloth_that_leaves_the_picture_is_no_gain():
@@ -161,42 +178,44 @@ def test_what_can_be_learnt_is_known_of_unseen_garments(tmp_path):
 def test_what_was_taught_is_what_plans_use(tmp_path):
     data, taught_so = lessons(20), options(tmp_path)
     ensemble = taught(data.values, data.gains, taught_so)
-    write(ensemble, data, {}, taught_so)
+    write(ensemble, ALL, data, {}, taught_so)
     with torch.no_grad():
         expected = ensemble(torch.from_numpy(data.values)).numpy()
-    judge = Judge.load(tmp_path / "judge")
+    judge = Judge.load(ALL, tmp_path / "judge")
     assert judge.names == data.names
     np.testing.assert_allclose(judge.expected(data.values), expected, atol=1e-6)
 
 
 def test_a_judge_that_knows_other_features_does_not_decide(tmp_path, situation):
     data, taught_so = lessons(20), options(tmp_path, epochs=1)
-    write(taught(data.values, data.gains, taught_so), data, {}, taught_so)
+    write(taught(data.values, data.gains, taught_so), ALL, data, {}, taught_so)
     with pytest.raises(BadRequest, match="other features"):
-        Judge.load(tmp_path / "judge").rated(situation, "flatten")
+        Judge.load(ALL, tmp_path / "judge").rated(situation, "flatten")
 
 
 def test_without_weights_the_command_that_makes_them_is_named(tmp_path):
     with pytest.raises(BadRequest, match=r"medor_planner\.judge\.train"):
-        Judge.load(tmp_path)
+        Judge.load(ALL, tmp_path)
 
 
+@pytest.mark.parametrize("name", JUDGES)
 @pytest.mark.parametrize("task", ["flatten", "canonicalize"])
-def test_the_shipped_judge_rates_in_the_units_of_the_task(situation, task):
-    rewards, now = Judge.load().rated(situation, task)
+def test_the_shipped_judges_rate_in_the_units_of_the_task(situation, task, name):
+    rewards, now = Judge.load(name).rated(situation, task)
     assert rewards.shape == (COUNT,)
     if task == "flatten":
         assert now == pytest.approx(Relief.of(situation.view, situation.camera).area_m2)
         assert (np.abs(rewards - now) < situation.goals.flat_coverage_m2).all()
     else:
-        assert now == pytest.approx(-features(situation)[1][0, features(situation)[0].index("a_unmoved_cost")])
+        told = features(situation)
+        assert now == pytest.approx(-told[1][0, told[0].index(f"{JUDGES[name][0]} unmoved_cost")])
         assert (np.abs(rewards - now) < 0.1).all()
 
 
-def test_a_judged_plan_hears_all_models_and_is_the_same_again(lab):
-    asked = PlanRequest(category="tshirt", method="medor+judge", candidates=6, seed=3)
-    one, two = (lab.bus.ask(endpoints.PLAN, asked) for _ in range(2))
-    assert {"reconstruct", "rollout", "judge"} <= set(one.timings_ms)
-    assert len(one.top_rewards) == 6
+def test_a_judged_plan_hears_all_models_and_is_the_same_again(full_lab):
+    asked = PlanRequest(category="tshirt", method="medor+judge", candidates=30, seed=3)
+    one, two = (full_lab.bus.ask(endpoints.PLAN, asked) for _ in range(2))
+    assert {"reconstruct", "screen", "rollout", "judge"} <= set(one.timings_ms)
+    assert (one.candidates, one.survivors) == (30, 20)
     np.testing.assert_array_equal(one.top_rewards, two.top_rewards)
     assert one.no_op == (one.top_rewards.max() <= one.no_op_reward)

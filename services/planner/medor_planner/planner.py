@@ -1,17 +1,16 @@
 """The planner: one observation in, the pick-and-place with the best predicted reward out (MEDOR, section IV-C)."""
 
 import threading
-from collections.abc import Callable, Mapping
-from functools import cache, partial
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from medor_planner.choice import Choice, no_op
-from medor_planner.goals import Goals, canonical_of
+from medor_planner.goals import Goals
+from medor_planner.judge.hearing import Hearing
 from medor_planner.judge.judge import Judge
-from medor_planner.judge.opinions import OPINIONS, consulted, reconstructed
-from medor_planner.judge.situation import Situation
 from medor_planner.methods import Method, method_named
 from medor_planner.plans import Plans
 from medor_planner.random_policy import random_action
@@ -31,6 +30,7 @@ from medor_wire.messages import (
     PlanProgress,
     PlanRequest,
     ReachRequest,
+    ReconstructRequest,
     Reward,
     RolloutRequest,
 )
@@ -48,14 +48,14 @@ class Planner:
         plans: Plans,
         chunk: int = CHUNK,
         screening: Screening | None = None,
-        judge: Callable[[], Judge] = Judge.load,
+        judge: Callable[[str], Judge] = Judge.load,
     ) -> None:
         self._bus = bus
         self._plans = plans
         self._goals = Goals(bus)
         self._chunk = chunk
         self._screening = screening or Screening()
-        self._judge_of = cache(judge)
+        self._hearing = Hearing(bus, self._goals, judge, self._screening, chunk)
 
     def plan(self, request: PlanRequest, call: Call) -> Plan:
         """The best of `request.candidates` sampled actions, or doing nothing when that is predicted best.
@@ -81,8 +81,7 @@ class Planner:
             with stages.stage("capture"):
                 view = request.view or self._bus.ask(endpoints.CAPTURE, Empty(), cancel=cancel)
             with stages.stage("reconstruct"):
-                meshes = self._meshes(method, request, view, cancel)
-                scene = Scene(next(iter(meshes.values())), view)
+                scene = Scene(self._mesh(method, request, view, cancel), view)
             if method.dynamics is None:
                 with stages.stage("sample"):
                     choice = Choice.unrated(random_action(scene, rng, reachable))
@@ -91,31 +90,20 @@ class Planner:
                     reward = self._reward(method, request, scene.mesh, cancel)
                 with stages.stage("sample"):
                     candidates = sample(scene, request.candidates, rng, reachable=reachable)
-                drawn = len(candidates)
-                candidates = self._screen(request, scene.mesh, candidates, reward, stages, cancel)
-                if method.judged:
-                    rewards, no_op_reward = self._judge(request, view, meshes, candidates, stages, cancel)
-                else:
-                    every = no_op(scene.mesh) + candidates
-                    backend = method.dynamics
-                    found = self._rewards("rollout", scene.mesh, every, reward, backend, self._chunk, stages, cancel)
-                    rewards, no_op_reward = found[1:], float(found[0])
-                choice = Choice(candidates, rewards, no_op_reward, drawn)
+                decide = self._hearing.choice if method.judged else partial(self._shoot, method, reward)
+                choice = decide(request, scene, candidates, stages, cancel)
         plan = choice.plan(request, scene.mesh, stages.total())
         self._plans.add(plan)
         return plan
 
-    def _meshes(
-        self, method: Method, request: PlanRequest, view: DepthView, cancel: threading.Event
-    ) -> dict[str, ClothMesh]:
-        """The meshes to plan on by reconstruction method, the one to choose picks on first."""
+    def _mesh(self, method: Method, request: PlanRequest, view: DepthView, cancel: threading.Event) -> ClothMesh:
         if method.recon is None:
             mesh = self._bus.ask(endpoints.TRUTH, Empty(), cancel=cancel).mesh
             if mesh.category != request.category:
                 raise BadRequest(f"asked to plan for {request.category}, but {mesh.category} lies on the table")
-            return {"": mesh}
-        wanted = (opinion.recon for opinion in OPINIONS) if method.judged else (method.recon,)
-        return reconstructed(self._bus, view, request.category, wanted, cancel)
+            return mesh
+        asked = ReconstructRequest(view=view, category=request.category, method=method.recon)
+        return self._bus.ask(endpoints.RECONSTRUCT, asked, cancel=cancel).mesh
 
     def _reward(self, method: Method, request: PlanRequest, mesh: ClothMesh, cancel: threading.Event) -> Reward:
         if request.task == "flatten":
@@ -128,56 +116,27 @@ class Planner:
         request = ReachRequest(points=picks, places=places, executor=executor)
         return self._bus.ask(endpoints.REACH, request).reachable
 
-    def _screen(
+    def _shoot(
         self,
-        request: PlanRequest,
-        mesh: ClothMesh,
-        candidates: Candidates,
+        method: Method,
         reward: Reward,
-        stages: Stages,
-        cancel: threading.Event,
-    ) -> Candidates:
-        """The candidates to roll out: the survivors of screening, or all of them."""
-        screening = self._screening
-        if request.exhaustive or screening.leaves(len(candidates)) == len(candidates):
-            return candidates
-
-        def rewards(some: Candidates, backend: str) -> NDArray[np.float64]:
-            return self._rewards("screen", mesh, some, reward, backend, SCREEN_CHUNK, stages, cancel)
-
-        return screening.survivors(candidates, rewards)
-
-    def _rewards(
-        self,
-        stage: Stage,
-        mesh: ClothMesh,
-        candidates: Candidates,
-        reward: Reward,
-        backend: str,
-        chunk: int,
-        stages: Stages,
-        cancel: threading.Event,
-    ) -> NDArray[np.float64]:
-        """(K,) what one backend foresees."""
-        asked = RolloutRequest(
-            mesh=mesh, picks=candidates.picks, places=candidates.places, reward=reward, backend=backend
-        )
-        with stages.stage(stage):
-            return Shooting(self._bus, asked, cancel, chunk).rewards(on_fraction=partial(stages.report, stage))
-
-    def _judge(
-        self,
         request: PlanRequest,
-        view: DepthView,
-        meshes: Mapping[str, ClothMesh],
+        scene: Scene,
         candidates: Candidates,
         stages: Stages,
         cancel: threading.Event,
-    ) -> tuple[NDArray[np.float64], float]:
-        """(K,) rewards to expect when all models have been heard, and that of doing nothing."""
-        goals = self._goals.of(canonical_of(next(iter(meshes.values()))), cancel)
-        with stages.stage("rollout"):
-            tell = partial(stages.report, "rollout")
-            foreseen = consulted(self._bus, meshes, candidates, cancel, tell, self._chunk)
-        with stages.stage("judge"):
-            return self._judge_of().rated(Situation(view, candidates, goals, foreseen), request.task)
+    ) -> Choice:
+        """Rolls candidates out: the survivors of screening, or all of them."""
+        mesh = scene.mesh
+
+        def rewards(stage: Stage, some: Candidates, backend: str, chunk: int) -> NDArray[np.float64]:
+            asked = RolloutRequest(mesh=mesh, picks=some.picks, places=some.places, reward=reward, backend=backend)
+            with stages.stage(stage):
+                tell = partial(stages.report, stage)
+                return Shooting(self._bus, asked, cancel, chunk).rewards(on_fraction=tell)
+
+        drawn, screening = len(candidates), self._screening
+        if not request.exhaustive and screening.leaves(drawn) < drawn:
+            candidates = screening.survivors(candidates, partial(rewards, "screen", chunk=SCREEN_CHUNK))
+        found = rewards("rollout", no_op(mesh) + candidates, method.dynamics or "", self._chunk)
+        return Choice(candidates, found[1:], float(found[0]), drawn)

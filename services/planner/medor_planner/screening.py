@@ -55,8 +55,12 @@ class Screening:
         except BadRequest as refused:  # a fault of the question the method's own model refuses as well
             self._tell(str(refused))
             return candidates
-        best = np.argsort(-rated, kind="stable")[: self.leaves(len(candidates))]
-        return candidates.where(np.isin(np.arange(len(candidates)), best))
+        return candidates.where(self.best(rated))
+
+    def best(self, rated: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(K,) the candidates that survive, of K rated ones."""
+        best = np.argsort(-rated, kind="stable")[: self.leaves(len(rated))]
+        return np.isin(np.arange(len(rated)), best)
 
     def _tell(self, reason: str) -> None:
         if reason not in self._told:

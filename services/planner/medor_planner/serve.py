@@ -3,7 +3,6 @@
 Plans run beside each other; actions and episodes one at a time, since there is one robot.
 """
 
-from functools import partial
 from pathlib import Path
 
 from pydantic import Field
@@ -31,14 +30,18 @@ class Config(Settings, section="planner"):
     keep: float = Field(default=KEEP, gt=0, le=1)
     """Share of the candidates that screening leaves."""
     judge: Path = SHIPPED
-    """Folder of the judge's weights, as `python -m medor_planner.judge.train` leaves it."""
+    """Folder of the judges' weights, as `python -m medor_planner.judge.train` leaves it."""
 
 
 def main(config: Config) -> None:
     with join("planner", config.bus) as bus:
         plans = Plans(config.keep_plans)
         planner = Planner(
-            bus, plans, config.chunk, Screening(config.screen, config.keep), partial(Judge.load, config.judge)
+            bus,
+            plans,
+            config.chunk,
+            Screening(config.screen, config.keep),
+            lambda name: Judge.load(name, config.judge),
         )
         executor = Executor(bus, plans)
         bus.serve(endpoints.PLAN, planner.plan, workers=config.plans_at_once)

@@ -26,11 +26,12 @@ class Stages:
 
     @contextmanager
     def stage(self, name: Stage) -> Iterator[None]:
+        """The block is part of a stage; one that comes again adds to its time."""
         self._call.check()
         self.report(name, 0.0)
         start = time.perf_counter()
         yield
-        self.timings_ms[name] = 1e3 * (time.perf_counter() - start)
+        self.timings_ms[name] = self.timings_ms.get(name, 0.0) + 1e3 * (time.perf_counter() - start)
         self.report(name, 1.0)
 
     def report(self, name: Stage, fraction: float) -> None:

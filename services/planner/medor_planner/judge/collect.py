@@ -129,9 +129,10 @@ class Garment:
         candidates = self._some(drawn, mesh)
         situation = Situation(
             view,
+            mesh,
             candidates,
             self._goals.of(canonical_of(mesh), self._never),
-            consulted(self._bus, meshes, candidates, self._never),
+            consulted(self._bus, OPINIONS, meshes, candidates, self._never),
         )
         return situation, self._outcomes(situation)
 
@@ -169,9 +170,9 @@ class Garment:
 
     def _act(self, robot: Holding, situation: Situation, outcomes: Outcomes, name: str) -> None:
         """Carry one of the candidates out."""
-        drawn, mesh = self._rng.random(), situation.foreseen[0]
+        drawn, first = self._rng.random(), situation.foreseen[OPINIONS[0].name]
         if drawn < BY_FORESIGHT:
-            favourite = coverages(mesh.positions[1:], mesh.mesh.faces, threads=1).argmax()
+            favourite = coverages(first.positions[1:], first.mesh.faces, threads=1).argmax()
         elif drawn < BY_COST:
             favourite = outcomes.cost_m[1:].argmin()
         elif drawn < BY_COVERAGE:

@@ -54,8 +54,8 @@ def _parts(situation: Situation, relief: Relief) -> Iterator[Columns]:
     yield _pull(situation, relief, picks, places, heading)
     yield _on_the_way(relief, picks, heading)
     yield _in_the_mesh(situation, picks, places, heading)
-    for name, one in zip("abcdefgh", situation.foreseen, strict=False):
-        yield {f"{name}_{key}": column for key, column in _foreseen(situation, relief, one).items()}
+    for name, one in situation.foreseen.items():
+        yield {f"{name} {key}": column for key, column in _foreseen(situation, relief, one).items()}
 
 
 def _garment(situation: Situation, relief: Relief) -> Columns:

@@ -14,12 +14,16 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
 from medor_planner.judge.features import features
+from medor_planner.judge.opinions import COARSE, OPINIONS
 from medor_planner.judge.situation import Situation
 from medor_wire.errors import BadRequest
 from medor_wire.messages import Task
 
 SHIPPED = Path(__file__).parent / "weights"
 WEIGHTS, CONFIG = "weights.safetensors", "config.json"
+ALL, SCREEN = "all", "screen"
+JUDGES = {ALL: tuple(opinion.name for opinion in OPINIONS), SCREEN: (COARSE.name,)}
+"""Folders of weights, and whom each judge listens to: one decides, one says what is worth a closer look."""
 TASKS: tuple[Task, ...] = ("flatten", "canonicalize")
 """Order of the networks' outputs."""
 LIMIT = 4.0
@@ -31,12 +35,14 @@ class Judge:
     """Small networks that agree by their mean.
 
     Attributes:
+        opinions: names of those it listens to.
         names: (F) features they were taught with.
         mean, scale: (F,) of the features.
         unit: (2,) of the outputs: share of the flat coverage, metres of canonical cost.
         members: by network its layers, weights (out, in) and biases (out,).
     """
 
+    opinions: tuple[str, ...]
     names: tuple[str, ...]
     mean: NDArray[np.float32]
     scale: NDArray[np.float32]
@@ -44,18 +50,19 @@ class Judge:
     members: tuple[tuple[tuple[NDArray[np.float32], NDArray[np.float32]], ...], ...]
 
     @classmethod
-    def load(cls, folder: Path = SHIPPED) -> Self:
-        """From a folder written by training.
+    def load(cls, name: str, root: Path = SHIPPED) -> Self:
+        """One of `JUDGES`, from the folder that training wrote.
 
         Raises:
             BadRequest: there are no weights in it.
         """
+        folder = root / name
         try:
             config: dict[str, Any] = json.loads((folder / CONFIG).read_text())
             arrays = {name: array.astype(np.float32) for name, array in load_file(folder / WEIGHTS).items()}
         except (OSError, ValueError, SafetensorError) as error:
             raise BadRequest(
-                f"no weights of the judge in {folder.name}/ ({error}); they are trained by "
+                f"no weights of the judge in {root.name}/{name}/ ({error}); they are trained by "
                 "`python -m medor_planner.judge.train --data <folder> --out <folder>`"
             ) from error
         members = tuple(
@@ -65,7 +72,14 @@ class Judge:
             )
             for m in range(config["members"])
         )
-        return cls(tuple(config["features"]), arrays["mean"], arrays["scale"], arrays["unit"], members)
+        return cls(
+            tuple(config["opinions"]),
+            tuple(config["features"]),
+            arrays["mean"],
+            arrays["scale"],
+            arrays["unit"],
+            members,
+        )
 
     def rated(self, situation: Situation, task: Task) -> tuple[NDArray[np.float64], float]:
         """Rewards to expect of the candidates (K,) and that of doing nothing: coverage [m²], or minus the canonical
@@ -73,9 +87,10 @@ class Judge:
 
         Raises:
             BadRequest: taught with other features.
+            KeyError: an opinion is missing.
             NoGarment: no pixel of the view shows cloth.
         """
-        names, values = features(situation)
+        names, values = features(situation.heard(self.opinions))
         if names != self.names:
             raise BadRequest("the judge's weights were taught with other features; train them anew")
         gains = self.expected(values)[:, TASKS.index(task)].astype(np.float64)
@@ -83,7 +98,7 @@ class Judge:
         if task == "flatten":
             now = first["covered"] * flat
             return now + gains * flat, now
-        now = -first["a_unmoved_cost"]
+        now = -first[f"{self.opinions[0]} unmoved_cost"]
         return now + gains, now
 
     def expected(self, values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -1,7 +1,7 @@
 """The models that are asked before the judge decides: each foresees the same candidates on a mesh of its own."""
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from medor_planner.choice import no_op
@@ -22,9 +22,15 @@ class Opinion:
     backend: str
     """Of dynamics."""
 
+    @property
+    def name(self) -> str:
+        return f"{self.recon}+{self.backend}"
 
-OPINIONS = (Opinion("medor", "layerless"), Opinion("isometric", "layerless"), Opinion("medor", "learned"))
-"""Whom the judge has learnt to listen to."""
+
+COARSE = Opinion("medor", "coarse")
+"""The rough model, cheap enough to be asked about every candidate."""
+OPINIONS = (Opinion("medor", "layerless"), Opinion("isometric", "layerless"), Opinion("medor", "learned"), COARSE)
+"""Whom the judge has learnt to listen to; picks are chosen on the first one's mesh."""
 
 
 def reconstructed(
@@ -41,22 +47,23 @@ def reconstructed(
 
 def consulted(
     bus: Bus,
+    opinions: Sequence[Opinion],
     meshes: Mapping[str, ClothMesh],
     candidates: Candidates,
     cancel: threading.Event,
     on_fraction: Callable[[float], None] = lambda share: None,
     chunk: int = CHUNK,
-) -> tuple[Foreseen, ...]:
-    """What each model foresees of doing nothing and of every candidate. Raises what `Shooting` does."""
+) -> dict[str, Foreseen]:
+    """What each model foresees of doing nothing and of every candidate, by its name. Raises what `Shooting` does."""
     every, reward = no_op(meshes[OPINIONS[0].recon]) + candidates, Reward(task="flatten")
-    found = []
-    for i, opinion in enumerate(OPINIONS):
+    found = {}
+    for i, opinion in enumerate(opinions):
         mesh = meshes[opinion.recon]
         asked = RolloutRequest(
             mesh=mesh, picks=every.picks, places=every.places, reward=reward, backend=opinion.backend
         )
         positions, _ = Shooting(bus, asked, cancel, chunk).rollouts(
-            lambda share, done=i: on_fraction((done + share) / len(OPINIONS))
+            lambda share, done=i: on_fraction((done + share) / len(opinions))
         )
-        found.append(Foreseen(mesh, positions))
-    return tuple(found)
+        found[opinion.name] = Foreseen(mesh, positions)
+    return found

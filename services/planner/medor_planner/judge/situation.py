@@ -1,6 +1,7 @@
 """A decision as the judge meets it: what was seen, what was believed, and what models foresaw of each candidate."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self, cast
 
@@ -34,19 +35,31 @@ class Situation:
 
     Attributes:
         view: what the camera saw.
+        mesh: on which picks were chosen.
         candidates: K of them.
         goals: of the mesh's canonical pose; all meshes share it.
-        foreseen: by one model after the other; the first one's mesh is where picks were chosen.
+        foreseen: by the name of the opinion.
     """
 
     view: DepthView
+    mesh: ClothMesh
     candidates: Candidates
     goals: GoalSet
-    foreseen: tuple[Foreseen, ...]
+    foreseen: Mapping[str, Foreseen]
 
-    @property
-    def mesh(self) -> ClothMesh:
-        return self.foreseen[0].mesh
+    def among(self, chosen: NDArray[np.bool_]) -> Self:
+        """The same decision among some of the candidates (K,)."""
+        kept = np.concatenate([[True], chosen])
+        foreseen = {name: Foreseen(one.mesh, one.positions[kept]) for name, one in self.foreseen.items()}
+        return replace(self, candidates=self.candidates.where(chosen), foreseen=foreseen)
+
+    def hearing(self, more: Mapping[str, Foreseen]) -> Self:
+        """The same decision, when more opinions are known."""
+        return replace(self, foreseen={**self.foreseen, **more})
+
+    def heard(self, names: Iterable[str]) -> Self:
+        """The same decision, when only some opinions are known."""
+        return replace(self, foreseen={name: self.foreseen[name] for name in names})
 
     @property
     def camera(self) -> Camera:
@@ -68,41 +81,36 @@ class Situation:
             "faces": mesh.faces,
             "canonical": mesh.canonical,
             "confidence": mesh.confidence,
+            "vertices": mesh.vertices,
+            "visible": mesh.visible,
         }
         if mask is not None:
             found["mask"] = mask
-        for i, one in enumerate(self.foreseen):
-            found[f"vertices_{i}"], found[f"visible_{i}"] = one.mesh.vertices, one.mesh.visible
-            found[f"positions_{i}"] = one.positions.astype(np.float16)
+        for name, one in self.foreseen.items():
+            found[f"vertices {name}"], found[f"visible {name}"] = one.mesh.vertices, one.mesh.visible
+            found[f"positions {name}"] = one.positions.astype(np.float16)
         return {name: array for name, array in found.items() if array is not None}
 
     @classmethod
-    def of(cls, arrays: dict[str, NDArray]) -> Self:
+    def restored(cls, arrays: dict[str, NDArray]) -> Self:
         """From what `arrays` gave."""
         category = cast(Category, str(arrays["category"]))
         depth = (arrays["depth"] * DEPTH_UNIT_M).astype(np.float32)
         height, width = depth.shape
         camera = CameraInfo(K=arrays["K"], T_world_camera=arrays["T_world_camera"], width=width, height=height)
-        count = sum(name.startswith("positions_") for name in arrays)
-        foreseen = tuple(
-            Foreseen(
-                ClothMesh(
-                    vertices=arrays[f"vertices_{i}"],
-                    faces=arrays["faces"],
-                    category=category,
-                    visible=arrays[f"visible_{i}"],
-                    canonical=arrays["canonical"],
-                    confidence=arrays.get("confidence"),
-                ),
-                arrays[f"positions_{i}"].astype(np.float32),
-            )
-            for i in range(count)
-        )
+        shared = {"faces": arrays["faces"], "category": category, "canonical": arrays["canonical"]}
+        shared["confidence"] = arrays.get("confidence")
+
+        def mesh(name: str) -> ClothMesh:
+            return ClothMesh(vertices=arrays[f"vertices{name}"], visible=arrays[f"visible{name}"], **shared)
+
+        names = [key.removeprefix("positions") for key in arrays if key.startswith("positions ")]
         return cls(
             DepthView(depth=depth, mask=arrays.get("mask"), camera=camera),
+            mesh(""),
             Candidates(arrays["picks"], arrays["places"]),
             GoalSet(goals=arrays["goals"].astype(np.float32), flat_coverage_m2=float(arrays["flat_coverage_m2"])),
-            foreseen,
+            {name[1:]: Foreseen(mesh(name), arrays[f"positions{name}"].astype(np.float32)) for name in names},
         )
 
 
@@ -138,4 +146,4 @@ def load(path: Path) -> tuple[Situation, Outcomes]:
         arrays = dict(file)
     true = {name[5:]: arrays.pop(name) for name in list(arrays) if name.startswith("true_")}
     scalars = {"flat_coverage_m2": float(true.pop("flat_coverage_m2")), "seed": int(true.pop("seed"))}
-    return Situation.of(arrays), Outcomes(**true, **scalars)
+    return Situation.restored(arrays), Outcomes(**true, **scalars)

@@ -6,7 +6,8 @@ favourite. Then networks are taught on all garments and written. Needs torch: `p
 """
 
 import sys
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from torch import Tensor, nn
 from medor_learn import weights
 from medor_learn.revision import revision
 from medor_planner.judge.features import features
-from medor_planner.judge.judge import LIMIT, TASKS
+from medor_planner.judge.judge import JUDGES, LIMIT, TASKS
 from medor_planner.judge.opinions import OPINIONS
 from medor_planner.judge.situation import Outcomes, load
 
@@ -75,6 +76,7 @@ class Lessons:
 
     @classmethod
     def read(cls, folder: Path) -> "Lessons":
+        """All states that were collected."""
         paths = sorted(folder.rglob("*.npz"))
         if not paths:
             raise SystemExit(f"{folder}: no states; collect some with `python -m medor_planner.judge.collect`")
@@ -82,12 +84,18 @@ class Lessons:
         rows, gains, garment = [], [], []
         for path in track(paths, "features", console=Console(stderr=True), transient=True):
             situation, outcomes = load(path)
-            names, values = features(situation)
+            names, values = features(situation.heard(opinion.name for opinion in OPINIONS))
             rows.append(values)
             gains.append(gained(outcomes))
             garment.append(np.full(len(values), outcomes.seed))
         state = np.repeat(np.arange(len(rows)), [len(values) for values in rows])
         return cls(names, np.concatenate(rows), np.concatenate(gains), state, np.concatenate(garment))
+
+    def told(self, opinions: Sequence[str]) -> "Lessons":
+        """The same, when only some opinions are known."""
+        silent = tuple(f"{opinion.name} " for opinion in OPINIONS if opinion.name not in opinions)
+        kept = [i for i, name in enumerate(self.names) if not name.startswith(silent)] if silent else slice(None)
+        return replace(self, names=tuple(np.array(self.names)[kept].tolist()), values=self.values[:, kept])
 
 
 def gained(outcomes: Outcomes) -> NDArray[np.float32]:
@@ -198,15 +206,13 @@ def merit(ratings: NDArray, gains: NDArray, state: NDArray[np.int64]) -> Merit:
     )
 
 
-def compared(data: Lessons, unseen: NDArray[np.float32]) -> dict[str, dict[str, Merit]]:
-    """By task: the judge's merit, each model's, and that of knowing."""
+def compared(data: Lessons, unseen: dict[str, NDArray[np.float32]]) -> dict[str, dict[str, Merit]]:
+    """By task: each judge's merit, each model's, and that of knowing."""
     found: dict[str, dict[str, Merit]] = {}
     for column, (task, said) in enumerate(zip(TASKS, ("gain", "nearer"), strict=True)):
         gains = data.gains[:, column]
-        ratings = {"judge": unseen[:, column]}
-        for letter, opinion in zip("abcdefgh", OPINIONS, strict=False):
-            name = f"{opinion.recon}, {opinion.backend}"
-            ratings[name] = data.values[:, data.names.index(f"{letter}_{said}")]
+        ratings = {f"judge: {name}": expected[:, column] for name, expected in unseen.items()}
+        ratings |= {it.name: data.values[:, data.names.index(f"{it.name} {said}")] for it in OPINIONS}
         ratings["the outcome itself"] = gains
         found[task] = {name: merit(rating, gains, data.state) for name, rating in ratings.items()}
     return found
@@ -222,23 +228,24 @@ def table(found: dict[str, dict[str, Merit]]) -> Table:
 
 def main(options: Options) -> None:
     torch.set_num_threads(1)
-    data = Lessons.read(options.data)
-    metrics: dict[str, Any] = {}
+    data, metrics = Lessons.read(options.data), {}
     if options.folds:
-        found = compared(data, judged_unseen(data, options))
+        unseen = {name: judged_unseen(data.told(opinions), options) for name, opinions in JUDGES.items()}
+        found = compared(data, unseen)
         Console().print(table(found))
         metrics = {task: {name: asdict(one) for name, one in merits.items()} for task, merits in found.items()}
-    ensemble = taught(data.values, data.gains, options)
-    write(ensemble, data, metrics, options)
-    sys.stdout.write(
-        f"{options.out}: taught on {data.state[-1] + 1} states of {len(np.unique(data.garment))} garments\n"
-    )
+    for name, opinions in JUDGES.items():
+        lessons = data.told(opinions)
+        write(taught(lessons.values, lessons.gains, options), name, lessons, metrics, options)
+    states, garments = data.state[-1] + 1, len(np.unique(data.garment))
+    sys.stdout.write(f"{options.out}: taught on {states} states of {garments} garments\n")
 
 
-def write(ensemble: Ensemble, data: Lessons, metrics: dict[str, Any], options: Options) -> None:
-    """The folder that `Judge.load` reads."""
+def write(ensemble: Ensemble, name: str, data: Lessons, metrics: dict[str, Any], options: Options) -> None:
+    """A folder that `Judge.load` reads."""
     schedule = {name: value for name, value in asdict(options).items() if name not in ("data", "out")}
     config = {
+        "opinions": list(JUDGES[name]),
         "features": list(data.names),
         "members": options.members,
         "layers": sorted({int(name.split(".")[2]) for name in ensemble.state_dict() if name.startswith("members.")}),
@@ -259,7 +266,7 @@ def write(ensemble: Ensemble, data: Lessons, metrics: dict[str, Any], options: O
         "Metrics": metrics,
         "Revision": str(config["revision"]),
     }
-    weights.save(options.out, ensemble, config, card)
+    weights.save(options.out / name, ensemble, config, card)
 
 
 if __name__ == "__main__":
