@@ -21,8 +21,10 @@ class Decision:
         chance: (K,) random numbers.
         nothing: reward of doing nothing, by the model.
         true: by the cloth solver, of the candidates that any share of survivors chooses.
+        planned: the planner's choice, screening as it is set.
         exhaustive_s: time of all rollouts [s].
         screen_s: of rating all candidates, shared by the replicas [s].
+        planned_s: of the planner's screening and rollouts [s].
     """
 
     model: NDArray[np.float64]
@@ -30,8 +32,10 @@ class Decision:
     chance: NDArray[np.float64]
     nothing: float
     true: Mapping[int, float]
+    planned: int
     exhaustive_s: float
     screen_s: float
+    planned_s: float
 
     @cached_property
     def best(self) -> int:
@@ -39,7 +43,10 @@ class Decision:
 
     def loss(self, rating: NDArray[np.float64], keep: float) -> tuple[float, float]:
         """Reward given away by rolling out the best by a rating only: by the model and by the solver, as shares."""
-        choice = chosen(self.model, rating, self.nothing, keep)
+        return self.loss_of(chosen(self.model, rating, self.nothing, keep))
+
+    def loss_of(self, choice: int) -> tuple[float, float]:
+        """Reward given away by a choice: by the model and by the solver, as shares."""
         by_model = {NOTHING: self.nothing, **dict(enumerate(self.model.tolist()))}
         return given_away(by_model, self.best, choice), given_away(self.true, self.best, choice)
 

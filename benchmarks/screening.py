@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.decision import Decision, chosen, survivors
+from benchmarks.decision import NOTHING, Decision, chosen, survivors
 from medor_wire import endpoints
 from medor_wire.bus import Bus
 from medor_wire.errors import BadRequest
@@ -91,7 +91,9 @@ def decisions(bus: Bus, options: Options) -> Iterator[tuple[str, Decision]]:
             for pick in range(options.picks):
                 plans = [exhaustive(bus, options, category, task, seed=pick) for task in options.tasks]
                 for plan in plans:
-                    yield f"{category} {state}, pick {pick + 1}, {plan.task}", decided(bus, options, plan, rng)
+                    screened = bus.ask(endpoints.PLAN, request(options, category, plan.task, seed=pick))
+                    one = decided(bus, options, plan, screened, rng)
+                    yield f"{category} {state}, pick {pick + 1}, {plan.task}", one
                 bus.ask(endpoints.EXECUTE, ExecuteRequest(plan_id=plans[0].plan_id))
 
 
@@ -109,7 +111,8 @@ def exhaustive(bus: Bus, options: Options, category: Category, task: Task, seed:
     return bus.ask(endpoints.PLAN, asked.model_copy(update={"exhaustive": True, "report": options.candidates}))
 
 
-def decided(bus: Bus, options: Options, plan: Plan, rng: np.random.Generator) -> Decision:
+def decided(bus: Bus, options: Options, plan: Plan, screened: Plan, rng: np.random.Generator) -> Decision:
+    """From a plan of all candidates and one, of the same, as the planner screens them."""
     rated = rolled_out(bus, plan.mesh, plan.task, plan.top_picks, plan.top_places, "coarse")
     chance = rng.random(len(rated.rewards))
     every = {
@@ -117,15 +120,31 @@ def decided(bus: Bus, options: Options, plan: Plan, rng: np.random.Generator) ->
         for rating in (rated.rewards, chance)
         for keep in (*options.keep, 1.0)
     }
+    planned = place_of(screened, plan)
     return Decision(
         model=plan.top_rewards,
         screen=rated.rewards,
         chance=chance,
         nothing=plan.no_op_reward,
-        true=true_rewards(bus, plan, sorted(every)),
-        exhaustive_s=plan.timings_ms["rollout"] / 1e3,
+        true=true_rewards(bus, plan, sorted(every | {planned})),
+        planned=planned,
+        exhaustive_s=seconds(plan),
         screen_s=rated.seconds / options.replicas,
+        planned_s=seconds(screened),
     )
+
+
+def seconds(plan: Plan) -> float:
+    """Of everything that foresees and rates [s]."""
+    return sum(plan.timings_ms.get(stage, 0.0) for stage in ("screen", "rollout", "judge")) / 1e3
+
+
+def place_of(screened: Plan, plan: Plan) -> int:
+    """Which of a plan's candidates another one chose."""
+    if screened.no_op:
+        return NOTHING
+    apart = np.abs(plan.top_picks - screened.pick).sum(axis=1) + np.abs(plan.top_places - screened.place).sum(axis=1)
+    return int(apart.argmin())
 
 
 def true_rewards(bus: Bus, plan: Plan, candidates: Sequence[int]) -> dict[int, float]:
@@ -159,12 +178,15 @@ def table(found: Sequence[Decision], shares: Sequence[float]) -> Table:
     title = f"{len(found)} decisions among {len(found[0].model)} candidates; reward given away, with 95 % intervals"
     out = Table("chosen by", "survivors", "seconds", "same choice", "by the model", "by the cloth solver", title=title)
     for keep in shares:
-        count, seconds = survivors(len(found[0].model), keep), np.mean([it.seconds(keep) for it in found])
+        count, spent = survivors(len(found[0].model), keep), np.mean([it.seconds(keep) for it in found])
         for name, ratings in (("screen", [it.screen for it in found]), ("chance", [it.chance for it in found])):
             losses = np.array([it.loss(rating, keep) for it, rating in zip(found, ratings, strict=True)])
             same = np.mean(losses[:, 0] == 0)
-            time = f"{seconds:.1f}" if name == "screen" else ""
+            time = f"{spent:.1f}" if name == "screen" else ""
             out.add_row(name, str(count), time, f"{same:.0%}", *(interval(column) for column in losses.T))
+    losses = np.array([it.loss_of(it.planned) for it in found])
+    same, time = np.mean(losses[:, 0] == 0), f"{np.mean([it.planned_s for it in found]):.1f}"
+    out.add_row("planner", "as set", time, f"{same:.0%}", *(interval(column) for column in losses.T))
     out.add_row("all", str(len(found[0].model)), f"{np.mean([it.exhaustive_s for it in found]):.1f}", "", "", "")
     return out
 

@@ -11,7 +11,9 @@ MODEL = np.array([0.9, 0.7, 0.5, 0.3])
 
 def decision(screen: np.ndarray, *, nothing: float = 0.1, true: dict[int, float] | None = None) -> Decision:
     truth = {NOTHING: nothing, **dict(enumerate(MODEL))} if true is None else true
-    return Decision(MODEL, screen, np.zeros(4), nothing, truth, exhaustive_s=10.0, screen_s=1.0)
+    return Decision(
+        MODEL, screen, np.zeros(4), nothing, truth, planned=0, exhaustive_s=10.0, screen_s=1.0, planned_s=3.0
+    )
 
 
 def test_a_screen_that_agrees_chooses_as_the_model_does():
@@ -29,6 +31,12 @@ def test_the_more_survive_the_less_is_given_away():
     assert losses[0] == pytest.approx((0.9 - 0.3) / 0.9)
 
 
+def test_a_choice_gives_away_what_it_is_worse_by():
+    assert [decision(MODEL).loss_of(choice)[0] for choice in (0, 2, NOTHING)] == pytest.approx(
+        [0, 0.4 / 0.9, 0.8 / 0.9]
+    )
+
+
 def test_doing_nothing_survives_always():
     assert chosen(MODEL, -MODEL, nothing=0.4, keep=0.25) == NOTHING
     assert decision(-MODEL, nothing=0.4).loss(-MODEL, 0.25)[0] == pytest.approx(0.5 / 0.9)
@@ -44,7 +52,7 @@ def test_where_the_model_errs_the_truth_may_gain():
 
 def test_distances_are_losses_too():
     """Rewards of `canonicalize` are minus distances."""
-    far = Decision(-MODEL[::-1], MODEL, np.zeros(4), -1.0, dict(enumerate(-MODEL[::-1])), 10.0, 1.0)
+    far = Decision(-MODEL[::-1], MODEL, np.zeros(4), -1.0, dict(enumerate(-MODEL[::-1])), 0, 10.0, 1.0, 3.0)
     assert far.loss(-np.arange(4.0)[::-1], 0.25) == pytest.approx((2, 2))
 
 
