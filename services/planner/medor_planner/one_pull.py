@@ -23,16 +23,21 @@ from scipy.stats import rankdata
 
 from medor_planner.choice import no_op
 from medor_planner.goals import Goals
+from medor_planner.judge.hearing import Hearing
+from medor_planner.judge.judge import Judge
 from medor_planner.methods import METHODS, Method
-from medor_planner.sampling import Candidates
+from medor_planner.sampling import Candidates, Scene
+from medor_planner.screening import Screening
 from medor_planner.shooting import Shooting
+from medor_planner.watching import Stages
 from medor_wire import endpoints
-from medor_wire.bus import Bus
+from medor_wire.bus import Bus, Call
 from medor_wire.errors import BadRequest, MedorError
 from medor_wire.launcher import Launcher, heed_signals
 from medor_wire.messages import (
     Category,
     ClothMesh,
+    DepthView,
     Empty,
     PlanRequest,
     ReconstructRequest,
@@ -51,7 +56,15 @@ ALL: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
 class Options:
     """What to measure."""
 
-    methods: tuple[str, ...] = ("visible", "medor", "isometric", "medor+physics", "isometric+physics", "oracle-mesh")
+    methods: tuple[str, ...] = (
+        "medor+judge",
+        "visible",
+        "medor",
+        "isometric",
+        "medor+physics",
+        "isometric+physics",
+        "oracle-mesh",
+    )
     categories: tuple[Category, ...] = ALL
     tasks: tuple[Task, ...] = ("flatten",)
     states: int = 4
@@ -158,7 +171,8 @@ def worth_of(bus: Bus, options: Options, category: Category, task: Task) -> Wort
     """Candidates on what lies on the table, rolled out by the solver on the true mesh."""
     count = options.candidates
     plan = bus.ask(
-        endpoints.PLAN, PlanRequest(category=category, task=task, method="oracle", candidates=count, report=count)
+        endpoints.PLAN,
+        PlanRequest(category=category, task=task, method="oracle", candidates=count, report=count, exhaustive=True),
     )
     score = bus.ask(endpoints.SCORE, Empty())
     room = score.flat_coverage_m2 - score.coverage_m2 if task == "flatten" else score.canonical_cost_m
@@ -167,9 +181,15 @@ def worth_of(bus: Bus, options: Options, category: Category, task: Task) -> Wort
 
 def rated(bus: Bus, method: Method, category: Category, task: Task, candidates: Candidates) -> NDArray[np.float64]:
     """(K + 1,) a method's rewards: of doing nothing, then of the candidates."""
-    mesh, cancel = mesh_of(bus, method, category), threading.Event()
+    cancel, view = threading.Event(), bus.ask(endpoints.CAPTURE, Empty())
+    mesh = mesh_of(bus, method, category, view)
     if method.dynamics is None:
         raise BadRequest("it rates nothing")
+    if method.judged:
+        asked = PlanRequest(category=category, task=task, method=method.name, exhaustive=True)
+        hearing, stages = Hearing(bus, Goals(bus), Judge.load, Screening()), Stages(Call(), lambda progress: None)
+        choice = hearing.choice(asked, Scene(mesh, view), candidates, stages, cancel)
+        return np.r_[choice.no_op_reward or 0.0, choice.rewards]
     reward = Reward(task=task, visible_only=method.visible_reward)
     if task == "canonicalize":
         reward = Goals(bus).reward(method, mesh, cancel)
@@ -178,10 +198,9 @@ def rated(bus: Bus, method: Method, category: Category, task: Task, candidates: 
     return Shooting(bus, asked, cancel).rewards(on_fraction=lambda share: None)
 
 
-def mesh_of(bus: Bus, method: Method, category: Category) -> ClothMesh:
+def mesh_of(bus: Bus, method: Method, category: Category, view: DepthView) -> ClothMesh:
     if method.recon is None:
         return bus.ask(endpoints.TRUTH, Empty()).mesh
-    view = bus.ask(endpoints.CAPTURE, Empty())
     return bus.ask(endpoints.RECONSTRUCT, ReconstructRequest(view=view, category=category, method=method.recon)).mesh
 
 

@@ -51,7 +51,7 @@ def demo(
     """Crumple a garment in a simulated cell and unfold it; writes episode.json and report.html.
 
     Args:
-        method: how the planner sees and foresees: medor+physics, visible, oracle, random, a row of the paper.
+        method: how the planner sees and foresees: medor+judge, visible, oracle, random, a row of the paper.
         category: of the garment.
         task: lay it flat anyhow, or into its canonical pose.
         seed: of the garment, the crumpling and the planning.

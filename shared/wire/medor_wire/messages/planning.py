@@ -10,7 +10,7 @@ from medor_wire.messages.cloth import ClothMesh
 from medor_wire.messages.simulated import ResetRequest
 from medor_wire.messages.view import DepthView
 
-DEFAULT_METHOD = "medor+physics"
+DEFAULT_METHOD = "medor+judge"
 """How to see and foresee where nothing else is asked for."""
 
 
