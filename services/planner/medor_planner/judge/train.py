@@ -41,17 +41,17 @@ class Options:
     data: Path
     """Folder that `medor_planner.judge.collect` filled; all files below it."""
     out: Path
-    members: int = 8
+    members: int = 6
     """Networks that are averaged."""
     hidden: int = 64
-    epochs: int = 40
+    epochs: int = 20
     batch: int = 128
     lr: float = 2e-3
     decay: float = 0.1
     dropout: float = 0.3
     noise: float = 0.05
     """On the features, in standard deviations."""
-    folds: int = 6
+    folds: int = 4
     """Of the cross-validation; 0: none."""
     seed: int = 0
 
