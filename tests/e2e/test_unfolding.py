@@ -5,7 +5,7 @@ import pytest
 
 from medor_wire import endpoints
 from medor_wire.launcher import Launcher
-from medor_wire.messages import Empty
+from medor_wire.messages import DEFAULT_METHOD, Empty
 
 GARMENT = {"category": "tshirt", "garment_seed": 800001, "state": "drop", "seed": 1}
 
@@ -46,7 +46,7 @@ def test_foreseeing_with_the_true_mesh_and_acting_once_grows_the_coverage(cell: 
 def test_a_depth_image_alone_is_enough(door: httpx.Client) -> None:
     door.post("/cell/reset", json=GARMENT).raise_for_status()
     seen = door.get("/cell/observation", headers={"Accept": "application/json"}).json()
-    given = {"category": GARMENT["category"], "method": "visible", "observation": seen}
+    given = {"category": GARMENT["category"], "method": DEFAULT_METHOD, "observation": seen}
     plans = (
         door.post("/plan", json={**given, "options": {"candidates": 60, "seed": seed}}).json() for seed in range(4)
     )
@@ -54,6 +54,6 @@ def test_a_depth_image_alone_is_enough(door: httpx.Client) -> None:
     assert chosen is not None, "none of 240 pick-and-places is better than doing nothing"
     assert chosen["timings_ms"]["capture"] < 1, "the cell's camera was asked although a view was given"
     assert chosen["predicted"]["reward"] > chosen["predicted"]["no_op_reward"]
-    seen_again = plan(door, "visible", candidates=1)["predicted"]["no_op_reward"]
+    seen_again = plan(door, DEFAULT_METHOD, candidates=1)["predicted"]["no_op_reward"]
     assert chosen["predicted"]["no_op_reward"] == pytest.approx(seen_again, rel=0.05)
     assert door.post(f"/plans/{chosen['plan_id']}/execute").json()["grasped"]
