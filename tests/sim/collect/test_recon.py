@@ -29,19 +29,26 @@ def test_depth_is_that_of_the_stored_positions(recon_data):
 
 
 def test_labels_lead_back_to_the_vertex_seen(recon_data):
-    """Canonical point of a pixel -> place on the canonical mesh -> same place on the posed mesh -> the pixel."""
+    """Canonical point of a pixel -> place on the canonical mesh -> same place on the posed mesh -> the pixel.
+
+    Positions are stored to 0.05 mm; at one pixel in a thousand that decides which of two layers is the upper one.
+    """
     trajectory = recon_data[0]
     record = trajectory.garment
     faces, canonical = record["faces"], record.garment.vertices.astype(np.float64)
     seen = rasterize(trajectory["positions"][-1], faces, CAMERA)
-    pixels = np.argwhere(seen.mask & trajectory["mask"][-1])[::37]
+    pixels = np.argwhere(seen.mask & trajectory["mask"][-1])
     points = record.box.decode(trajectory["nocs"][-1][tuple(pixels.T)])
-    for pixel, point in zip(pixels, points, strict=True):
+    ends = np.empty((len(pixels), 2))
+    for i, (pixel, point) in enumerate(zip(pixels, points, strict=True)):
         corners = canonical[faces[seen.face[tuple(pixel)]]]
         weights = np.linalg.lstsq(np.vstack([corners.T, np.ones(3)]), np.append(point, 1), rcond=None)[0]
         posed = weights @ trajectory["positions"][-1][faces[seen.face[tuple(pixel)]]]
         column, row = CAMERA.project(posed)[0]
-        np.testing.assert_allclose([row, column], pixel + 0.5, atol=0.3)
+        ends[i] = row, column
+    off = np.abs(ends - pixels - 0.5).max(axis=1)
+    assert len(off) > 1000
+    assert np.mean(off < 0.3) > 0.998
 
 
 def test_a_pixel_at_a_corner_of_a_face_has_the_label_of_its_vertex(scene):
