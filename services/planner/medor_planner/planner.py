@@ -15,7 +15,7 @@ from medor_planner.methods import Method, method_named
 from medor_planner.plans import Plans
 from medor_planner.random_policy import random_action
 from medor_planner.sampling import Candidates, Scene, sample
-from medor_planner.screening import Screening
+from medor_planner.screening import SCREEN_CHUNK, Screening
 from medor_planner.shooting import CHUNK, Shooting
 from medor_planner.watching import Stage, Stages, cancelling
 from medor_wire import endpoints
@@ -34,9 +34,6 @@ from medor_wire.messages import (
     Reward,
     RolloutRequest,
 )
-
-SCREEN_CHUNK = 50
-"""Candidates per request to rate them: about as much work as to roll out a third of them."""
 
 
 class Planner:

@@ -20,6 +20,8 @@ log = logging.getLogger(__name__)
 BACKEND = "coarse"
 KEEP = 0.15
 """Share of the candidates that survives."""
+SCREEN_CHUNK = 50
+"""Candidates per request to rate them: about as much work as to roll out a third of them."""
 AT_LEAST = 20
 """Survivors that a plan has in any case: those it reports."""
 

@@ -23,10 +23,9 @@ from medor_planner.executor import Executor
 from medor_planner.goals import Goals, canonical_of
 from medor_planner.judge.opinions import OPINIONS, consulted, reconstructed
 from medor_planner.judge.situation import Outcomes, Situation, save
-from medor_planner.planner import SCREEN_CHUNK
 from medor_planner.plans import Plans
 from medor_planner.sampling import Candidates, Scene, sample
-from medor_planner.screening import BACKEND
+from medor_planner.screening import BACKEND, SCREEN_CHUNK
 from medor_planner.shooting import Shooting
 from medor_wire import endpoints
 from medor_wire.bus import Bus

@@ -10,14 +10,11 @@ from medor_planner.judge.judge import ALL, SCREEN, Judge
 from medor_planner.judge.opinions import COARSE, OPINIONS, Opinion, consulted, reconstructed
 from medor_planner.judge.situation import Foreseen, Situation
 from medor_planner.sampling import Candidates, Scene
-from medor_planner.screening import Screening
+from medor_planner.screening import SCREEN_CHUNK, Screening
 from medor_planner.shooting import CHUNK
 from medor_planner.watching import Stage, Stages
 from medor_wire.bus import Bus
 from medor_wire.messages import PlanRequest
-
-ROUGH_CHUNK = 50
-"""Candidates per request to the rough model: about as much work as to roll out a third of them."""
 
 
 class Hearing:
@@ -62,7 +59,7 @@ class Hearing:
             with stages.stage(stage):
                 return consulted(self._bus, opinions, meshes, some, cancel, partial(stages.report, stage), chunk)
 
-        drawn = Situation(scene.view, scene.mesh, candidates, goals, hear("screen", [COARSE], candidates, ROUGH_CHUNK))
+        drawn = Situation(scene.view, scene.mesh, candidates, goals, hear("screen", [COARSE], candidates, SCREEN_CHUNK))
         left = drawn
         if not request.exhaustive and self._screening.leaves(len(candidates)) < len(candidates):
             with stages.stage("judge"):
