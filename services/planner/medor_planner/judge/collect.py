@@ -2,8 +2,9 @@
 
 Starts a simulated cell and unfolds garments of the training seeds. At every state the models foresee what some
 candidates would do, on the meshes that reconstruction makes of the view, and the cloth solver rolls the same
-candidates out on the true garment. Then one of them is carried out: what a model likes best, the truly best one, or
-any. One file a state; kill it and start it again: it goes on.
+candidates out on the true garment. Then one of them is carried out: what the last judge likes best, the truly best
+one, or any. So a judge learns from where the one before it leads. One file a state; kill it and start it again: it goes
+on.
 """
 
 import sys
@@ -21,11 +22,12 @@ from medor_cloth.alignment import canonical_cost
 from medor_cloth.coverage import coverages
 from medor_planner.executor import Executor
 from medor_planner.goals import Goals, canonical_of
-from medor_planner.judge.opinions import OPINIONS, consulted, reconstructed
+from medor_planner.judge.judge import ALL, SCREEN, SHIPPED, Judge
+from medor_planner.judge.opinions import COARSE, OPINIONS, consulted, reconstructed
 from medor_planner.judge.situation import Outcomes, Situation, save
 from medor_planner.plans import Plans
-from medor_planner.sampling import Candidates, Scene, sample
-from medor_planner.screening import BACKEND, SCREEN_CHUNK
+from medor_planner.sampling import Scene, sample
+from medor_planner.screening import SCREEN_CHUNK
 from medor_planner.shooting import Shooting
 from medor_wire import endpoints
 from medor_wire.bus import Bus
@@ -35,19 +37,20 @@ from medor_wire.launcher import Launcher, heed_signals
 from medor_wire.messages import (
     ActRequest,
     Category,
-    ClothMesh,
     Empty,
     ReachRequest,
     ResetRequest,
     Reward,
     RolloutRequest,
+    Task,
 )
 
 FIRST_SEED = 600_000
 """Garments that no other network has learnt from; held-out ones begin at 800000."""
-ALL: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
-BY_FORESIGHT, BY_COST, BY_COVERAGE = 0.45, 0.6, 0.8
-"""Shares of the pulls carried out, summed up: the model's favourite, the truly best ones; what is left: any."""
+CATEGORIES: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
+TASKS: tuple[Task, ...] = ("flatten", "canonicalize")
+BY_JUDGE, BY_TRUTH = 0.65, 0.85
+"""Shares of the pulls carried out, summed up: the judge's favourite, the truly best one; what is left: any."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +62,17 @@ class Options:
     """Of all shards together."""
     shard: str = "0/1"
     """Which part, of how many: `i/N`, counted from 0."""
-    categories: tuple[Category, ...] = ALL
-    pulls: int = 5
+    categories: tuple[Category, ...] = CATEGORIES
+    pulls: int = 7
     """States of one garment, each a pull after the last."""
-    drawn: int = 100
+    drawn: int = 300
     """Candidates drawn at a state."""
     best: int = 14
-    """Of these, taken as the rough model rates them."""
+    """Of these, taken as the screening judge rates them, half of them for each task."""
     others: int = 10
     """Of the rest, taken at random."""
+    judge: Path | None = SHIPPED
+    """Folder of the last judge's weights; `None`: there is none that knows today's features, models are trusted."""
 
 
 def main(options: Options) -> None:
@@ -104,6 +109,7 @@ class Garment:
         self._bus, self._options, self._seed = bus, options, seed
         self._category: Category = category
         self._goals, self._rng = Goals(bus), np.random.default_rng(seed)
+        self._task: Task = TASKS[int(self._rng.integers(len(TASKS)))]
         self._executor = Executor(bus, Plans())
         self._never = threading.Event()
 
@@ -124,30 +130,34 @@ class Garment:
         wanted = (opinion.recon for opinion in OPINIONS)
         meshes = reconstructed(self._bus, view, self._category, wanted, self._never)
         mesh = meshes[OPINIONS[0].recon]
-        drawn = sample(Scene(mesh, view), self._options.drawn, self._rng, reachable=self._reachable)
-        candidates = self._some(drawn, mesh)
-        situation = Situation(
-            view,
-            mesh,
-            candidates,
-            self._goals.of(canonical_of(mesh), self._never),
-            consulted(self._bus, OPINIONS, meshes, candidates, self._never),
-        )
+        candidates = sample(Scene(mesh, view), self._options.drawn, self._rng, reachable=self._reachable)
+        goals = self._goals.of(canonical_of(mesh), self._never)
+        rough = consulted(self._bus, [COARSE], meshes, candidates, self._never, chunk=SCREEN_CHUNK)
+        drawn = Situation(view, mesh, candidates, goals, rough)
+        some = drawn.among(self._some(drawn))
+        others = [opinion for opinion in OPINIONS if opinion is not COARSE]
+        situation = some.hearing(consulted(self._bus, others, meshes, some.candidates, self._never))
         return situation, self._outcomes(situation)
 
     def _reachable(self, picks: NDArray[np.float32], places: NDArray[np.float32]) -> NDArray[np.bool_]:
         return self._bus.ask(endpoints.REACH, ReachRequest(points=picks, places=places)).reachable
 
-    def _some(self, drawn: Candidates, mesh: ClothMesh) -> Candidates:
-        """The best of the candidates, as the screen rates them, and some of the others."""
-        asked = RolloutRequest(
-            mesh=mesh, picks=drawn.picks, places=drawn.places, reward=Reward(task="flatten"), backend=BACKEND
-        )
-        rated = Shooting(self._bus, asked, self._never, SCREEN_CHUNK).rewards(on_fraction=lambda share: None)
-        order = np.argsort(-rated, kind="stable")
-        best, rest = order[: self._options.best], order[self._options.best :]
-        others = self._rng.permutation(rest)[: self._options.others]
-        return drawn.where(np.isin(np.arange(len(drawn)), np.concatenate([best, others])))
+    def _some(self, drawn: Situation) -> NDArray[np.bool_]:
+        """(K,) the best of the candidates, as the screen rates them for either task, and some of the others."""
+        chosen = np.zeros(len(drawn.candidates), np.bool_)
+        for task in TASKS:
+            chosen[np.argsort(-self._rated(drawn, SCREEN, task), kind="stable")[: self._options.best // 2]] = True
+        chosen[self._rng.permutation(np.flatnonzero(~chosen))[: self._options.others]] = True
+        return chosen
+
+    def _rated(self, situation: Situation, judge: str, task: Task) -> NDArray[np.float64]:
+        """(K,) what to expect of candidates: what the last judge says or, without one, the first model heard."""
+        if self._options.judge:
+            return Judge.load(judge, self._options.judge).rated(situation, task)[0]
+        first = next(iter(situation.foreseen.values()))
+        if task == "flatten":
+            return coverages(first.positions[1:], first.mesh.faces, threads=1)
+        return -canonical_cost(first.positions[1:], situation.goals.goals)
 
     def _outcomes(self, situation: Situation) -> Outcomes:
         """What the candidates do to the true garment."""
@@ -169,13 +179,11 @@ class Garment:
 
     def _act(self, robot: Holding, situation: Situation, outcomes: Outcomes, name: str) -> None:
         """Carry one of the candidates out."""
-        drawn, first = self._rng.random(), situation.foreseen[OPINIONS[0].name]
-        if drawn < BY_FORESIGHT:
-            favourite = coverages(first.positions[1:], first.mesh.faces, threads=1).argmax()
-        elif drawn < BY_COST:
-            favourite = outcomes.cost_m[1:].argmin()
-        elif drawn < BY_COVERAGE:
-            favourite = outcomes.coverage_m2[1:].argmax()
+        drawn, truth = self._rng.random(), {"flatten": outcomes.coverage_m2, "canonicalize": -outcomes.cost_m}
+        if drawn < BY_JUDGE:
+            favourite = self._rated(situation, ALL, self._task).argmax()
+        elif drawn < BY_TRUTH:
+            favourite = truth[self._task][1:].argmax()
         else:
             favourite = self._rng.integers(len(situation.candidates))
         pick, place = situation.candidates.picks[favourite], situation.candidates.places[favourite]
