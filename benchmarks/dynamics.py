@@ -34,7 +34,7 @@ def main(options: Options) -> None:
     table = Table("preset", "nodes", "edges", "precision", f"{options.candidates} candidates", "CPU", "one by one", "")
     for preset in options.presets:
         found = measured(preset, options)
-        for precision in ("float32", "bfloat16"):
+        for precision in [name for name in ("float32", "bfloat16") if name in found]:
             table.add_row(*row(preset, precision, found, options.candidates))
     Console().print(table)
 

@@ -9,6 +9,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from medor_learn.precision import has_bf16
+
 
 @dataclass(frozen=True, eq=False)
 class Dense:
@@ -46,7 +48,7 @@ def can_fuse(dtype: torch.dtype) -> bool:
     """Whether this torch on this processor has a layer and its ReLU in one pass."""
     if not torch.backends.mkldnn.is_available() or not hasattr(torch.ops.mkldnn, "_linear_pointwise"):
         return False
-    return dtype == torch.float32 or (dtype == torch.bfloat16 and torch.ops.mkldnn._is_mkldnn_bf16_supported())
+    return dtype == torch.float32 or (dtype == torch.bfloat16 and has_bf16())
 
 
 class DenseMlp:

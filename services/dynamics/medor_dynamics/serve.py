@@ -19,11 +19,13 @@ from medor_dynamics.physics import Physics, without_layers
 from medor_dynamics.roller import Roller
 from medor_dynamics.shipped import DEFAULT
 from medor_dynamics.warm_up import warm_up
+from medor_learn.precision import has_bf16
 from medor_wire import endpoints
 from medor_wire.bus import join
 from medor_wire.config import Settings
 
-PRECISIONS = {"bfloat16": torch.bfloat16, "float32": torch.float32}
+BF16, FP32 = torch.bfloat16, torch.float32
+PRECISIONS = {"auto": BF16 if has_bf16() else FP32, "bfloat16": BF16, "float32": FP32}
 
 
 class Config(Settings, section="dynamics"):
@@ -35,8 +37,8 @@ class Config(Settings, section="dynamics"):
     """How many times as easily as usual the cloth of all backends but `learned` bends."""
     weights: Path = DEFAULT
     """Folder of the learned model, as training leaves it in `best`."""
-    precision: Literal["bfloat16", "float32"] = "bfloat16"
-    """Of the learned models' hidden values."""
+    precision: Literal["auto", "bfloat16", "float32"] = "auto"
+    """Of the learned model's hidden values; `auto`: bfloat16 where the processor is fast at it."""
 
 
 def main(config: Config) -> None:

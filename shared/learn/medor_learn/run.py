@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from medor_learn import checkpoint, weights
 from medor_learn.checkpoint import Standing
 from medor_learn.errors import Diverged
+from medor_learn.precision import has_bf16
 from medor_learn.progress import TrainingProgress
 from medor_learn.revision import revision
 from medor_learn.schedule import Schedule
@@ -133,7 +134,8 @@ class Run:
         partial.replace(self.log)
 
     def _autocast(self) -> torch.autocast:
-        return torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=self.schedule.bf16)
+        kind = self.device.type
+        return torch.autocast(kind, dtype=torch.bfloat16, enabled=self.schedule.bf16 and has_bf16(kind))
 
     def _tick(self) -> None:
         now = time.process_time()

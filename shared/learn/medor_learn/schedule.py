@@ -21,7 +21,7 @@ class Schedule:
         warm_up: steps until it is reached.
         weight_decay: of matrices and kernels; biases and norms have none.
         clip: greatest norm of the gradient.
-        bf16: run the network in bfloat16 where torch's autocast deems it safe.
+        bf16: run the network in bfloat16 where torch's autocast deems it safe and the device is fast at it.
         validate_every: steps between two looks at held-out data.
         checkpoint_s: seconds between two checkpoints.
         patience: validations without a better score after which training ends; None for never.

@@ -63,9 +63,11 @@ class Options:
     shard: str = "0/1"
     """Which part, of how many: `i/N`, counted from 0."""
     categories: tuple[Category, ...] = CATEGORIES
+    first_seed: int = FIRST_SEED
+    """Of the garments; others than the last judge learnt from make its merit and the next one's comparable."""
     pulls: int = 7
     """States of one garment, each a pull after the last."""
-    drawn: int = 300
+    drawn: int = 120
     """Candidates drawn at a state."""
     best: int = 14
     """Of these, taken as the screening judge rates them, half of them for each task."""
@@ -96,9 +98,9 @@ def main(options: Options) -> None:
         for number in garments:
             category: Category = options.categories[number % len(options.categories)]
             try:
-                Garment(cell.bus, options, category, FIRST_SEED + number).collect()
+                Garment(cell.bus, options, category, options.first_seed + number).collect()
             except MedorError as error:
-                bar.console.print(f"{category} {FIRST_SEED + number}: {error}", highlight=False)
+                bar.console.print(f"{category} {options.first_seed + number}: {error}", highlight=False)
             bar.advance(task)
 
 
