@@ -3,21 +3,27 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
+from medor_cloth.alignment import canonical_cost
 from medor_cloth.camera import Camera
 from medor_planner.judge import situation as stored
 from medor_planner.judge.features import features
-from medor_planner.judge.judge import ALL, JUDGES, Judge
+from medor_planner.judge.judge import ALL, GLANCE, JUDGES, Judge
 from medor_planner.judge.opinions import COARSE, OPINIONS
 from medor_planner.judge.relief import CELL_M, Relief
 from medor_planner.judge.situation import Foreseen, Outcomes, Situation
-from medor_planner.judge.train import Lessons, Options, gained, judged_unseen, merit, taught, write
+from medor_planner.judge.train import Lessons, Options, gained, glanced, judged_unseen, merit, taught, write
+from medor_planner.judge.train import main as train
+from medor_planner.planner import GLANCES, Planner
+from medor_planner.plans import Plans
 from medor_planner.sampling import Candidates, Scene, anywhere, sample
 from medor_wire import endpoints
+from medor_wire.bus import Call
 from medor_wire.errors import BadRequest, NoGarment
 from medor_wire.messages import CameraInfo, ClothMesh, DepthView, GoalSet, PlanRequest
 
@@ -125,6 +131,15 @@ def test_what_is_stored_comes_back(situation, tmp_path):
     np.testing.assert_allclose(features(again)[1], features(situation)[1], atol=0.02)
 
 
+def test_what_a_glance_learns_from_comes_back(situation, tmp_path):
+    gains = np.random.default_rng(0).normal(size=(COUNT, 2)).astype(np.float32)
+    stored.save_glance(tmp_path / "one.npz", situation, gains, 7)
+    again, told, seed = stored.load_glance(tmp_path / "one.npz")
+    assert (dict(again.foreseen), seed) == ({}, 7)
+    np.testing.assert_array_equal(told, gains)
+    np.testing.assert_allclose(features(again)[1], features(situation.heard([]))[1], atol=0.02)
+
+
 def test_of_some_candidates_only_those_are_told(situation):
     chosen = np.arange(COUNT) % 3 == 0
     np.testing.assert_allclose(features(situation.among(chosen))[1], features(situation)[1][chosen], atol=1e-6)
@@ -175,6 +190,30 @@ def test_what_can_be_learnt_is_known_of_unseen_garments(tmp_path):
         assert found.gain > 0.9 * best.gain
 
 
+def test_a_glance_that_knows_the_gains_misses_none():
+    data = lessons(20)
+    knows, guesses = glanced(data, data.gains), glanced(data, np.zeros_like(data.gains))
+    for task in ("flatten", "canonicalize"):
+        assert knows[task]["of the fifth a glance likes"] == knows[task]["of all"]
+        assert guesses[task]["of the fifth a glance likes"] < knows[task]["of all"]
+
+
+def test_both_kinds_of_judges_are_taught_from_what_was_collected(situation, tmp_path):
+    few = options(tmp_path, epochs=1, folds=0)
+    with pytest.raises(SystemExit, match=r"medor_planner\.judge\.collect"):
+        train(few)
+    (tmp_path / stored.GLANCES).mkdir()
+    stored.save_glance(tmp_path / stored.GLANCES / "one.npz", situation, np.zeros((COUNT, 2)), 7)
+    train(few)
+    assert {folder.name for folder in few.out.iterdir()} == {GLANCE}
+    outcomes = Outcomes(np.arange(13.0), np.arange(13.0) / 100, np.ones(13), 0.05, 7)
+    (tmp_path / stored.DECISIONS).mkdir()
+    stored.save(tmp_path / stored.DECISIONS / "one.npz", situation, outcomes)
+    train(few)
+    for name in JUDGES:
+        assert np.isfinite(Judge.load(name, few.out).gains(situation)).all()
+
+
 def test_what_was_taught_is_what_plans_use(tmp_path):
     data, taught_so = lessons(20), options(tmp_path)
     ensemble = taught(data.values, data.gains, taught_so)
@@ -207,8 +246,7 @@ def test_the_shipped_judges_rate_in_the_units_of_the_task(situation, task, name)
         assert now == pytest.approx(Relief.of(situation.view, situation.camera).area_m2)
         assert (np.abs(rewards - now) < situation.goals.flat_coverage_m2).all()
     else:
-        told = features(situation)
-        assert now == pytest.approx(-told[1][0, told[0].index(f"{JUDGES[name][0]} unmoved_cost")])
+        assert now == pytest.approx(-canonical_cost(situation.mesh.vertices, situation.goals.goals))
         assert (np.abs(rewards - now) < 0.1).all()
 
 
@@ -216,6 +254,23 @@ def test_a_judged_plan_hears_all_models_and_is_the_same_again(full_lab):
     asked = PlanRequest(category="tshirt", method="medor+judge", candidates=30, seed=3)
     one, two = (full_lab.bus.ask(endpoints.PLAN, asked) for _ in range(2))
     assert {"reconstruct", "screen", "rollout", "judge"} <= set(one.timings_ms)
-    assert (one.candidates, one.survivors) == (30, 20)
+    assert (one.candidates, one.survivors) == (30 * GLANCES, 20)
     np.testing.assert_array_equal(one.top_rewards, two.top_rewards)
     assert one.no_op == (one.top_rewards.max() <= one.no_op_reward)
+
+
+class LikesLongPulls:
+    """A judge that knows only how far pulls go."""
+
+    def rated(self, situation: Situation, task: str) -> tuple[np.ndarray, float]:
+        return np.linalg.norm(situation.candidates.places - situation.candidates.picks, axis=1), 0.0
+
+
+def test_what_a_glance_likes_best_of_many_pulls_is_rolled_out(full_lab):
+    judges: dict[str, Any] = {ALL: Judge.load(ALL), GLANCE: LikesLongPulls()}
+    planner = Planner(full_lab.bus, Plans(), judge=judges.__getitem__, glances=20)
+    plan = planner.plan(
+        PlanRequest(category="tshirt", method="medor+judge", candidates=10, exhaustive=True, seed=3), Call()
+    )
+    assert (plan.candidates, plan.survivors) == (200, 10)
+    assert np.linalg.norm(plan.top_places - plan.top_picks, axis=1).min() > 0.185

@@ -186,7 +186,9 @@ def rated(bus: Bus, method: Method, category: Category, task: Task, candidates: 
     if method.dynamics is None:
         raise BadRequest("it rates nothing")
     if method.judged:
-        asked = PlanRequest(category=category, task=task, method=method.name, exhaustive=True)
+        asked = PlanRequest(
+            category=category, task=task, method=method.name, candidates=len(candidates), exhaustive=True
+        )
         hearing, stages = Hearing(bus, Goals(bus), Judge.load, Screening()), Stages(Call(), lambda progress: None)
         choice = hearing.choice(asked, Scene(mesh, view), candidates, stages, cancel)
         return np.r_[choice.no_op_reward or 0.0, choice.rewards]

@@ -35,6 +35,9 @@ from medor_wire.messages import (
     RolloutRequest,
 )
 
+GLANCES = 5
+"""Pulls that a judge glances at for every candidate that is asked for."""
+
 
 class Planner:
     """Plans by asking: the cell for what it sees, recon for the mesh, dynamics for what actions would do."""
@@ -46,11 +49,12 @@ class Planner:
         chunk: int = CHUNK,
         screening: Screening | None = None,
         judge: Callable[[str], Judge] = Judge.load,
+        glances: int = GLANCES,
     ) -> None:
         self._bus = bus
         self._plans = plans
         self._goals = Goals(bus)
-        self._chunk = chunk
+        self._chunk, self._glances = chunk, glances
         self._screening = screening or Screening()
         self._hearing = Hearing(bus, self._goals, judge, self._screening, chunk)
 
@@ -86,7 +90,8 @@ class Planner:
                 with stages.stage("goals"):
                     reward = self._reward(method, request, scene.mesh, cancel)
                 with stages.stage("sample"):
-                    candidates = sample(scene, request.candidates, rng, reachable=reachable)
+                    count = request.candidates * (self._glances if method.judged else 1)
+                    candidates = sample(scene, count, rng, reachable=reachable)
                 decide = self._hearing.choice if method.judged else partial(self._shoot, method, reward)
                 choice = decide(request, scene, candidates, stages, cancel)
         plan = choice.plan(request, scene.mesh, stages.total())

@@ -57,14 +57,14 @@ class Screening:
         except BadRequest as refused:  # a fault of the question the method's own model refuses as well
             self._tell(str(refused))
             return candidates
-        return candidates.where(self.best(rated))
-
-    def best(self, rated: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(K,) the candidates that survive, of K rated ones."""
-        best = np.argsort(-rated, kind="stable")[: self.leaves(len(rated))]
-        return np.isin(np.arange(len(rated)), best)
+        return candidates.where(best(rated, self.leaves(len(rated))))
 
     def _tell(self, reason: str) -> None:
         if reason not in self._told:
             self._told.add(reason)
             log.warning("plans without screening, every candidate is rolled out: %s", reason)
+
+
+def best(rated: NDArray[np.float64], count: int) -> NDArray[np.bool_]:
+    """(K,) so many of K rated candidates that are rated best."""
+    return np.isin(np.arange(len(rated)), np.argsort(-rated, kind="stable")[:count])

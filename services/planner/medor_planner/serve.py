@@ -10,7 +10,7 @@ from pydantic import Field
 from medor_planner.episode import Episodes
 from medor_planner.executor import Executor
 from medor_planner.judge.judge import SHIPPED, Judge
-from medor_planner.planner import Planner
+from medor_planner.planner import GLANCES, Planner
 from medor_planner.plans import Plans
 from medor_planner.screening import BACKEND, KEEP, Screening
 from medor_planner.shooting import CHUNK
@@ -29,6 +29,8 @@ class Config(Settings, section="planner"):
     """Dynamics backend that chooses the candidates that are rolled out; empty: none, all are."""
     keep: float = Field(default=KEEP, gt=0, le=1)
     """Share of the candidates that screening leaves."""
+    glances: int = Field(default=GLANCES, ge=1)
+    """Pulls that a judge glances at for every candidate that is asked for."""
     judge: Path = SHIPPED
     """Folder of the judges' weights, as `python -m medor_planner.judge.train` leaves it."""
 
@@ -42,6 +44,7 @@ def main(config: Config) -> None:
             config.chunk,
             Screening(config.screen, config.keep),
             lambda name: Judge.load(name, config.judge),
+            config.glances,
         )
         executor = Executor(bus, plans)
         bus.serve(endpoints.PLAN, planner.plan, workers=config.plans_at_once)

@@ -3,8 +3,9 @@
 Starts a simulated cell and unfolds garments of the training seeds. At every state the models foresee what some
 candidates would do, on the meshes that reconstruction makes of the view, and the cloth solver rolls the same
 candidates out on the true garment. Then one of them is carried out: what the last judge likes best, the truly best
-one, or any. So a judge learns from where the one before it leads. One file a state; kill it and start it again: it goes
-on.
+one, or any. So a judge learns from where the one before it leads. A glance learns to say at once what the last judge
+says of candidates when it has heard the rough model; `--glances` collects only that, several times as fast. One file a
+state in `decisions` and `glances`; kill it and start it again: it goes on.
 """
 
 import sys
@@ -22,17 +23,16 @@ from medor_cloth.alignment import canonical_cost
 from medor_cloth.coverage import coverages
 from medor_planner.executor import Executor
 from medor_planner.goals import Goals, canonical_of
-from medor_planner.judge.judge import ALL, SCREEN, SHIPPED, Judge
+from medor_planner.judge.judge import ALL, SCREEN, SHIPPED, TASKS, Judge
 from medor_planner.judge.opinions import COARSE, OPINIONS, consulted, reconstructed
-from medor_planner.judge.situation import Outcomes, Situation, save
+from medor_planner.judge.situation import DECISIONS, GLANCES, Outcomes, Situation, save, save_glance
 from medor_planner.plans import Plans
 from medor_planner.sampling import Scene, sample
-from medor_planner.screening import SCREEN_CHUNK
+from medor_planner.screening import SCREEN_CHUNK, best
 from medor_planner.shooting import Shooting
 from medor_wire import endpoints
 from medor_wire.bus import Bus
 from medor_wire.errors import MedorError
-from medor_wire.holding import Holding
 from medor_wire.launcher import Launcher, heed_signals
 from medor_wire.messages import (
     ActRequest,
@@ -48,7 +48,6 @@ from medor_wire.messages import (
 FIRST_SEED = 600_000
 """Garments that no other network has learnt from; held-out ones begin at 800000."""
 CATEGORIES: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
-TASKS: tuple[Task, ...] = ("flatten", "canonicalize")
 BY_JUDGE, BY_TRUTH = 0.65, 0.85
 """Shares of the pulls carried out, summed up: the judge's favourite, the truly best one; what is left: any."""
 
@@ -73,13 +72,16 @@ class Options:
     """Of these, taken as the screening judge rates them, half of them for each task."""
     others: int = 10
     """Of the rest, taken at random."""
+    glances: bool = False
+    """Leave out the other models and what truly comes."""
     judge: Path | None = SHIPPED
     """Folder of the last judge's weights; `None`: there is none that knows today's features, models are trusted."""
 
 
 def main(options: Options) -> None:
     part, parts = (int(number) for number in options.shard.split("/"))
-    options.out.mkdir(parents=True, exist_ok=True)
+    for folder in (DECISIONS, GLANCES):
+        (options.out / folder).mkdir(parents=True, exist_ok=True)
     garments = range(part, -(-options.states // options.pulls), parts)
     environment = {"MEDOR_DYNAMICS__REPLICAS": "1", "MEDOR_DYNAMICS__THREADS": "1"}
     columns = (
@@ -117,49 +119,61 @@ class Garment:
 
     def collect(self) -> None:
         """Write the states that are not there yet. Raises what the cell's services do."""
-        paths = [self._options.out / f"{self._category}-{self._seed}-{k}.npz" for k in range(self._options.pulls)]
-        if all(path.exists() for path in paths):
+        names = [f"{self._category}-{self._seed}-{k}.npz" for k in range(self._options.pulls)]
+        last = GLANCES if self._options.glances else DECISIONS
+        if all((self._options.out / last / name).exists() for name in names):
             return
         self._bus.ask(endpoints.RESET, ResetRequest(category=self._category, garment_seed=self._seed, seed=self._seed))
         with self._executor.hold() as robot:
-            for path in paths:
-                situation, outcomes = self._decision()
-                save(path, situation, outcomes)
-                self._act(robot, situation, outcomes, path.stem)
+            for name in names:
+                robot.act(self._decided(robot.epoch, name))
 
-    def _decision(self) -> tuple[Situation, Outcomes]:
+    def _decided(self, epoch: int, name: str) -> ActRequest:
+        """Write what there is to be learnt from the garment as it lies; one of the candidates to carry out."""
         view = self._bus.ask(endpoints.CAPTURE, Empty())
-        wanted = (opinion.recon for opinion in OPINIONS)
-        meshes = reconstructed(self._bus, view, self._category, wanted, self._never)
+        asked = OPINIONS[:1] if self._options.glances else OPINIONS
+        meshes = reconstructed(self._bus, view, self._category, [opinion.recon for opinion in asked], self._never)
         mesh = meshes[OPINIONS[0].recon]
         candidates = sample(Scene(mesh, view), self._options.drawn, self._rng, reachable=self._reachable)
         goals = self._goals.of(canonical_of(mesh), self._never)
         rough = consulted(self._bus, [COARSE], meshes, candidates, self._never, chunk=SCREEN_CHUNK)
         drawn = Situation(view, mesh, candidates, goals, rough)
-        some = drawn.among(self._some(drawn))
-        others = [opinion for opinion in OPINIONS if opinion is not COARSE]
-        situation = some.hearing(consulted(self._bus, others, meshes, some.candidates, self._never))
-        return situation, self._outcomes(situation)
+        gains, truth = self._gains(drawn, SCREEN), None
+        save_glance(self._options.out / GLANCES / name, drawn, gains, self._seed)
+        if not self._options.glances:
+            drawn = drawn.among(self._some(gains))
+            others = [opinion for opinion in OPINIONS if opinion is not COARSE]
+            drawn = drawn.hearing(consulted(self._bus, others, meshes, drawn.candidates, self._never))
+            outcomes = self._outcomes(drawn)
+            save(self._options.out / DECISIONS / name, drawn, outcomes)
+            gains, truth = self._gains(drawn, ALL), np.stack([outcomes.coverage_m2, -outcomes.cost_m], axis=1)[1:]
+        chosen = self._chosen(gains, truth)
+        return ActRequest(
+            action_id=f"{name}-{uuid.uuid4().hex}",
+            epoch=epoch,
+            pick=drawn.candidates.picks[chosen].astype(np.float64),
+            place=drawn.candidates.places[chosen].astype(np.float64),
+        )
 
     def _reachable(self, picks: NDArray[np.float32], places: NDArray[np.float32]) -> NDArray[np.bool_]:
         return self._bus.ask(endpoints.REACH, ReachRequest(points=picks, places=places)).reachable
 
-    def _some(self, drawn: Situation) -> NDArray[np.bool_]:
-        """(K,) the best of the candidates, as the screen rates them for either task, and some of the others."""
-        chosen = np.zeros(len(drawn.candidates), np.bool_)
-        for task in TASKS:
-            chosen[np.argsort(-self._rated(drawn, SCREEN, task), kind="stable")[: self._options.best // 2]] = True
+    def _some(self, gains: NDArray) -> NDArray[np.bool_]:
+        """(K,) the best of the candidates, as the screen rates them (K, 2) for either task, and some of the others."""
+        chosen = np.zeros(len(gains), np.bool_)
+        for column in gains.T:
+            chosen |= best(column, self._options.best // 2)
         chosen[self._rng.permutation(np.flatnonzero(~chosen))[: self._options.others]] = True
         return chosen
 
-    def _rated(self, situation: Situation, judge: str, task: Task) -> NDArray[np.float64]:
-        """(K,) what to expect of candidates: what the last judge says or, without one, the first model heard."""
+    def _gains(self, situation: Situation, judge: str) -> NDArray:
+        """(K, 2) what to expect of candidates: what the last judge says or, without one, the first model heard."""
         if self._options.judge:
-            return Judge.load(judge, self._options.judge).rated(situation, task)[0]
-        first = next(iter(situation.foreseen.values()))
-        if task == "flatten":
-            return coverages(first.positions[1:], first.mesh.faces, threads=1)
-        return -canonical_cost(first.positions[1:], situation.goals.goals)
+            return Judge.load(judge, self._options.judge).gains(situation)
+        first, goals = next(iter(situation.foreseen.values())), situation.goals
+        covered = coverages(first.positions, first.mesh.faces, threads=1) / goals.flat_coverage_m2
+        cost = canonical_cost(first.positions, goals.goals)
+        return np.stack([covered[1:] - covered[0], cost[0] - cost[1:]], axis=1)
 
     def _outcomes(self, situation: Situation) -> Outcomes:
         """What the candidates do to the true garment."""
@@ -179,24 +193,14 @@ class Garment:
             seed=self._seed,
         )
 
-    def _act(self, robot: Holding, situation: Situation, outcomes: Outcomes, name: str) -> None:
-        """Carry one of the candidates out."""
-        drawn, truth = self._rng.random(), {"flatten": outcomes.coverage_m2, "canonicalize": -outcomes.cost_m}
+    def _chosen(self, gains: NDArray, truth: NDArray | None) -> int:
+        """Which candidate to carry out, of what is expected of them (K, 2) and what truly comes, where known."""
+        drawn, column = self._rng.random(), TASKS.index(self._task)
         if drawn < BY_JUDGE:
-            favourite = self._rated(situation, ALL, self._task).argmax()
-        elif drawn < BY_TRUTH:
-            favourite = truth[self._task][1:].argmax()
-        else:
-            favourite = self._rng.integers(len(situation.candidates))
-        pick, place = situation.candidates.picks[favourite], situation.candidates.places[favourite]
-        robot.act(
-            ActRequest(
-                action_id=f"{name}-{uuid.uuid4().hex}",
-                epoch=robot.epoch,
-                pick=pick.astype(np.float64),
-                place=place.astype(np.float64),
-            )
-        )
+            return int(gains[:, column].argmax())
+        if drawn < BY_TRUTH and truth is not None:
+            return int(truth[:, column].argmax())
+        return int(self._rng.integers(len(gains)))
 
 
 if __name__ == "__main__":

@@ -1,18 +1,18 @@
-"""A judged decision: the rough model is heard about every candidate, all models about the best of them."""
+"""A judged decision: a glance at many pulls, and all models' word on those that it likes best."""
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache, partial
 
 from medor_planner.choice import Choice
 from medor_planner.goals import Goals, canonical_of
-from medor_planner.judge.judge import ALL, SCREEN, Judge
-from medor_planner.judge.opinions import COARSE, OPINIONS, Opinion, consulted, reconstructed
-from medor_planner.judge.situation import Foreseen, Situation
+from medor_planner.judge.judge import ALL, GLANCE, Judge
+from medor_planner.judge.opinions import OPINIONS, consulted, reconstructed
+from medor_planner.judge.situation import Situation
 from medor_planner.sampling import Candidates, Scene
-from medor_planner.screening import SCREEN_CHUNK, Screening
+from medor_planner.screening import Screening, best
 from medor_planner.shooting import CHUNK
-from medor_planner.watching import Stage, Stages
+from medor_planner.watching import Stages
 from medor_wire.bus import Bus
 from medor_wire.messages import PlanRequest
 
@@ -40,9 +40,16 @@ class Hearing:
         self._judge = cache(judge)
 
     def choice(
-        self, request: PlanRequest, scene: Scene, candidates: Candidates, stages: Stages, cancel: threading.Event
+        self, request: PlanRequest, scene: Scene, drawn: Candidates, stages: Stages, cancel: threading.Event
     ) -> Choice:
         """The candidates that were rolled out, with the rewards to expect of them.
+
+        Args:
+            request: what is asked for.
+            scene: the garment as seen.
+            drawn: pulls to glance at.
+            stages: told what goes on.
+            cancel: stops waiting.
 
         Raises:
             BadRequest: no weights, or of other features.
@@ -55,18 +62,15 @@ class Hearing:
         with stages.stage("goals"):
             goals = self._goals.of(canonical_of(scene.mesh), cancel)
 
-        def hear(stage: Stage, opinions: list[Opinion], some: Candidates, chunk: int) -> Mapping[str, Foreseen]:
-            with stages.stage(stage):
-                return consulted(self._bus, opinions, meshes, some, cancel, partial(stages.report, stage), chunk)
-
-        drawn = Situation(scene.view, scene.mesh, candidates, goals, hear("screen", [COARSE], candidates, SCREEN_CHUNK))
-        left = drawn
-        if not request.exhaustive and self._screening.leaves(len(candidates)) < len(candidates):
-            with stages.stage("judge"):
-                rewards, _ = self._judge(SCREEN).rated(drawn, request.task)
-            left = drawn.among(self._screening.best(rewards))
-        rest = [opinion for opinion in OPINIONS if opinion is not COARSE]
-        left = left.hearing(hear("rollout", rest, left.candidates, self._chunk))
+        count = request.candidates if request.exhaustive else self._screening.leaves(request.candidates)
+        case = Situation(scene.view, scene.mesh, drawn, goals, {})
+        if len(drawn) > count:
+            with stages.stage("screen"):
+                rewards, _ = self._judge(GLANCE).rated(case, request.task)
+            case = case.among(best(rewards, count))
+        with stages.stage("rollout"):
+            tell = partial(stages.report, "rollout")
+            case = case.hearing(consulted(self._bus, OPINIONS, meshes, case.candidates, cancel, tell, self._chunk))
         with stages.stage("judge"):
-            rewards, no_op_reward = self._judge(ALL).rated(left, request.task)
-        return Choice(left.candidates, rewards, no_op_reward, len(candidates))
+            rewards, no_op_reward = self._judge(ALL).rated(case, request.task)
+        return Choice(case.candidates, rewards, no_op_reward, len(drawn))

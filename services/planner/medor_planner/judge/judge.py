@@ -13,17 +13,20 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load_file
 
+from medor_cloth.alignment import canonical_cost
 from medor_planner.judge.features import features
 from medor_planner.judge.opinions import COARSE, OPINIONS
+from medor_planner.judge.relief import Relief
 from medor_planner.judge.situation import Situation
 from medor_wire.errors import BadRequest
 from medor_wire.messages import Task
 
 SHIPPED = Path(__file__).parent / "weights"
 WEIGHTS, CONFIG = "weights.safetensors", "config.json"
-ALL, SCREEN = "all", "screen"
-JUDGES = {ALL: tuple(opinion.name for opinion in OPINIONS), SCREEN: (COARSE.name,)}
-"""Folders of weights, and whom each judge listens to: one decides, one says what is worth a closer look."""
+ALL, SCREEN, GLANCE = "all", "screen", "glance"
+JUDGES = {ALL: tuple(opinion.name for opinion in OPINIONS), SCREEN: (COARSE.name,), GLANCE: ()}
+"""Folders of weights, and whom each judge listens to: one decides; one hears the rough model and teaches the last, who
+hears none and says at a glance what is worth rolling out."""
 TASKS: tuple[Task, ...] = ("flatten", "canonicalize")
 """Order of the networks' outputs."""
 LIMIT = 4.0
@@ -90,16 +93,19 @@ class Judge:
             KeyError: an opinion is missing.
             NoGarment: no pixel of the view shows cloth.
         """
+        gains, goals = self.gains(situation)[:, TASKS.index(task)].astype(np.float64), situation.goals
+        if task == "flatten":
+            now = Relief.of(situation.view, situation.camera).area_m2
+            return now + gains * goals.flat_coverage_m2, now
+        now = -float(canonical_cost(situation.mesh.vertices[None], goals.goals)[0])
+        return now + gains, now
+
+    def gains(self, situation: Situation) -> NDArray[np.float32]:
+        """(K, 2) what to expect of the candidates, as `expected` gives it. Raises what `rated` does."""
         names, values = features(situation.heard(self.opinions))
         if names != self.names:
             raise BadRequest("the judge's weights were taught with other features; train them anew")
-        gains = self.expected(values)[:, TASKS.index(task)].astype(np.float64)
-        flat, first = situation.goals.flat_coverage_m2, dict(zip(names, values[0].tolist(), strict=True))
-        if task == "flatten":
-            now = first["covered"] * flat
-            return now + gains * flat, now
-        now = -first[f"{self.opinions[0]} unmoved_cost"]
-        return now + gains, now
+        return self.expected(values)
 
     def expected(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """(K, 2) expected gains of features (K, F): share of the flat coverage, metres of canonical cost."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self, cast
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,18 +132,42 @@ class Outcomes:
     seed: int
 
 
+DECISIONS, GLANCES = "decisions", "glances"
+"""Folders below the one of a collection."""
+
+
 def save(path: Path, situation: Situation, outcomes: Outcomes) -> None:
     """Write both to one file, at once."""
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
-        np.savez_compressed(file, **situation.arrays(), **{f"true_{k}": v for k, v in vars(outcomes).items()})
-    part.replace(path)
+    _write(path, situation.arrays() | {f"true_{k}": v for k, v in vars(outcomes).items()})
 
 
 def load(path: Path) -> tuple[Situation, Outcomes]:
     """What `save` wrote."""
-    with np.load(path) as file:
-        arrays = dict(file)
+    arrays = _read(path)
     true = {name[5:]: arrays.pop(name) for name in list(arrays) if name.startswith("true_")}
     scalars = {"flat_coverage_m2": float(true.pop("flat_coverage_m2")), "seed": int(true.pop("seed"))}
     return Situation.restored(arrays), Outcomes(**true, **scalars)
+
+
+def save_glance(path: Path, situation: Situation, gains: NDArray, seed: int) -> None:
+    """Write what is known before any model is heard, and the gains (K, 2) that a judge expects who heard one."""
+    _write(path, situation.heard([]).arrays() | {"gains": gains.astype(np.float32), "seed": np.array(seed)})
+
+
+def load_glance(path: Path) -> tuple[Situation, NDArray[np.float32], int]:
+    """What `save_glance` wrote."""
+    arrays = _read(path)
+    gains, seed = arrays.pop("gains"), int(arrays.pop("seed"))
+    return Situation.restored(arrays), gains, seed
+
+
+def _write(path: Path, arrays: Mapping[str, Any]) -> None:
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+    part.replace(path)
+
+
+def _read(path: Path) -> dict[str, NDArray]:
+    with np.load(path) as file:
+        return dict(file)

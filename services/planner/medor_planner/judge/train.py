@@ -2,11 +2,12 @@
 
 A minute or two on one core. First every garment is judged by networks that have not seen it (cross-validation over
 garments): how well they rank, and what their favourite among a state's candidates brings, beside each model's
-favourite. Then networks are taught on all garments and written. Needs torch: `pip install medor-planner[train]`.
+favourite. Then networks are taught on all garments and written. A glance learns what the last judge said; how much is
+lost is told. Needs torch: `pip install medor-planner[train]`.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,9 +25,9 @@ from torch import Tensor, nn
 from medor_learn import weights
 from medor_learn.revision import revision
 from medor_planner.judge.features import features
-from medor_planner.judge.judge import JUDGES, LIMIT, TASKS
+from medor_planner.judge.judge import GLANCE, JUDGES, LIMIT, TASKS
 from medor_planner.judge.opinions import OPINIONS
-from medor_planner.judge.situation import Outcomes, load
+from medor_planner.judge.situation import DECISIONS, GLANCES, Outcomes, Situation, load, load_glance
 
 UNIT = (0.05, 0.008)
 """Typical gains: share of the flat coverage, metres of canonical cost."""
@@ -39,7 +40,7 @@ class Options:
     """How to learn."""
 
     data: Path
-    """Folder that `medor_planner.judge.collect` filled; all files below it."""
+    """Folder that `medor_planner.judge.collect` filled."""
     out: Path
     members: int = 6
     """Networks that are averaged."""
@@ -54,6 +55,10 @@ class Options:
     folds: int = 4
     """Of the cross-validation; 0: none."""
     seed: int = 0
+
+
+Lesson = tuple[Situation, NDArray[np.float32], int]
+"""What is known of K candidates, their gains (K, 2) and the garment's seed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,19 +80,16 @@ class Lessons:
     garment: NDArray[np.int64]
 
     @classmethod
-    def read(cls, folder: Path) -> "Lessons":
+    def read(cls, paths: Sequence[Path], lesson: Callable[[Path], Lesson]) -> "Lessons":
         """All states that were collected."""
-        paths = sorted(folder.rglob("*.npz"))
-        if not paths:
-            raise SystemExit(f"{folder}: no states; collect some with `python -m medor_planner.judge.collect`")
         names: tuple[str, ...] = ()
         rows, gains, garment = [], [], []
         for path in track(paths, "features", console=Console(stderr=True), transient=True):
-            situation, outcomes = load(path)
-            names, values = features(situation.heard(opinion.name for opinion in OPINIONS))
+            situation, gain, seed = lesson(path)
+            names, values = features(situation)
             rows.append(values)
-            gains.append(gained(outcomes))
-            garment.append(np.full(len(values), outcomes.seed))
+            gains.append(gain)
+            garment.append(np.full(len(values), seed))
         state = np.repeat(np.arange(len(rows)), [len(values) for values in rows])
         return cls(names, np.concatenate(rows), np.concatenate(gains), state, np.concatenate(garment))
 
@@ -96,6 +98,12 @@ class Lessons:
         silent = tuple(f"{opinion.name} " for opinion in OPINIONS if opinion.name not in opinions)
         kept = [i for i, name in enumerate(self.names) if not name.startswith(silent)] if silent else slice(None)
         return replace(self, names=tuple(np.array(self.names)[kept].tolist()), values=self.values[:, kept])
+
+
+def outcome(path: Path) -> Lesson:
+    """A decision of which all models were heard, and what truly came."""
+    situation, outcomes = load(path)
+    return situation.heard(opinion.name for opinion in OPINIONS), gained(outcomes), outcomes.seed
 
 
 def gained(outcomes: Outcomes) -> NDArray[np.float32]:
@@ -226,22 +234,62 @@ def table(found: dict[str, dict[str, Merit]]) -> Table:
     return out
 
 
+def glanced(data: Lessons, ratings: NDArray[np.float32]) -> dict[str, dict[str, float]]:
+    """By task: the greatest gain (as the teacher says) of a state's candidates, of the fifth that ratings (N, 2) like
+    best, and of any fifth; means over states."""
+    found = {}
+    for column, task in enumerate(TASKS):
+        greatest = []
+        for one in np.unique(data.state):
+            gains, rated = data.gains[data.state == one, column], ratings[data.state == one, column]
+            fifth = -(-len(gains) // 5)
+            shares = [gains[:length].max() for length in (len(gains), fifth)]  # candidates are in no order
+            greatest.append([shares[0], gains[np.argsort(-rated)[:fifth]].max(), shares[1]])
+        keys = ("of all", "of the fifth a glance likes", "of any fifth")
+        found[task] = dict(zip(keys, np.mean(greatest, axis=0).round(5).tolist(), strict=True))
+    return found
+
+
 def main(options: Options) -> None:
     torch.set_num_threads(1)
-    data, metrics = Lessons.read(options.data), {}
+    decisions, glances = (sorted((options.data / folder).glob("*.npz")) for folder in (DECISIONS, GLANCES))
+    if not decisions and not glances:
+        raise SystemExit(f"{options.data}: no states; collect some with `python -m medor_planner.judge.collect`")
+    if decisions:
+        teach_from_outcomes(Lessons.read(decisions, outcome), options)
+    if glances:
+        teach_a_glance(Lessons.read(glances, load_glance), options)
+
+
+def teach_from_outcomes(data: Lessons, options: Options) -> None:
+    """The judges that hear models."""
+    judges, metrics = {name: opinions for name, opinions in JUDGES.items() if opinions}, {}
     if options.folds:
-        unseen = {name: judged_unseen(data.told(opinions), options) for name, opinions in JUDGES.items()}
+        unseen = {name: judged_unseen(data.told(opinions), options) for name, opinions in judges.items()}
         found = compared(data, unseen)
         Console().print(table(found))
         metrics = {task: {name: asdict(one) for name, one in merits.items()} for task, merits in found.items()}
-    for name, opinions in JUDGES.items():
-        lessons = data.told(opinions)
-        write(taught(lessons.values, lessons.gains, options), name, lessons, metrics, options)
+    for name, opinions in judges.items():
+        teach(name, data.told(opinions), metrics, options)
+
+
+def teach_a_glance(data: Lessons, options: Options) -> None:
+    """The judge that hears none, of what one that did said."""
+    metrics = {}
+    if options.folds:
+        metrics = glanced(data, judged_unseen(data, options))
+        Console().print_json(data=metrics)
+    teach(GLANCE, data, metrics, options)
+
+
+def teach(name: str, data: Lessons, metrics: Mapping[str, Any], options: Options) -> None:
+    """One judge, on all there is."""
+    write(taught(data.values, data.gains, options), name, data, metrics, options)
     states, garments = data.state[-1] + 1, len(np.unique(data.garment))
-    sys.stdout.write(f"{options.out}: taught on {states} states of {garments} garments\n")
+    sys.stdout.write(f"{options.out / name}: taught on {states} states of {garments} garments\n")
 
 
-def write(ensemble: Ensemble, name: str, data: Lessons, metrics: dict[str, Any], options: Options) -> None:
+def write(ensemble: Ensemble, name: str, data: Lessons, metrics: Mapping[str, Any], options: Options) -> None:
     """A folder that `Judge.load` reads."""
     schedule = {name: value for name, value in asdict(options).items() if name not in ("data", "out")}
     config = {
