@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import nn
 
-from medor_learn import weights
+from medor_learn import run, weights
 from medor_learn.errors import Diverged, LearnError, ResumeError
 from medor_learn.loop import Schedule, train
 
@@ -78,6 +78,19 @@ def test_a_run_that_was_stopped_ends_as_one_that_was_not(tmp_path, bf16):
     assert same(second.module, whole.module)
     assert lines(tmp_path / "parts") == lines(tmp_path / "whole")
     assert resumed["best"] == summary["best"]
+
+
+@pytest.mark.parametrize("fast", [False, True])
+def test_bfloat16_is_used_only_where_the_processor_is_fast_at_it(tmp_path, monkeypatch, fast):
+    class Watched(Waves):
+        def loss(self, step):
+            seen.append(torch.is_autocast_enabled("cpu"))
+            return super().loss(step)
+
+    seen: list[bool] = []
+    monkeypatch.setattr(run, "has_bf16", lambda kind: fast)
+    train(Watched(), tmp_path, replace(SCHEDULE, bf16=True), card=CARD)
+    assert seen == [fast] * SCHEDULE.steps
 
 
 def test_going_on_from_an_old_checkpoint_forgets_what_came_after_it(tmp_path):

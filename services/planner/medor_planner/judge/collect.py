@@ -66,7 +66,7 @@ class Options:
     """Of the garments; others than the last judge learnt from make its merit and the next one's comparable."""
     pulls: int = 7
     """States of one garment, each a pull after the last."""
-    drawn: int = 120
+    drawn: int = 200
     """Candidates drawn at a state."""
     best: int = 14
     """Of these, taken as the screening judge rates them, half of them for each task."""
