@@ -246,7 +246,7 @@ def glanced(data: Lessons, ratings: NDArray[np.float32]) -> dict[str, dict[str, 
             shares = [gains[:length].max() for length in (len(gains), fifth)]  # candidates are in no order
             greatest.append([shares[0], gains[np.argsort(-rated)[:fifth]].max(), shares[1]])
         keys = ("of all", "of the fifth a glance likes", "of any fifth")
-        found[task] = dict(zip(keys, np.mean(greatest, axis=0).round(5).tolist(), strict=True))
+        found[task] = dict(zip(keys, np.mean(greatest, axis=0, dtype=np.float64).round(5).tolist(), strict=True))
     return found
 
 
@@ -308,7 +308,8 @@ def write(ensemble: Ensemble, name: str, data: Lessons, metrics: Mapping[str, An
     }
     card = {
         "What it is": "Rates pick-and-place candidates: the gain in coverage and in closeness to the canonical pose to "
-        "expect of each, from what several models foresee and what the camera sees.",
+        f"expect of each, from what the camera sees, what the mesh believes and what models foresee: "
+        f"{', '.join(JUDGES[name]) or 'none, it glances'}.",
         "Data": config["data"],
         "Schedule": schedule,
         "Metrics": metrics,
