@@ -246,7 +246,7 @@ def glanced(data: Lessons, ratings: NDArray[np.float32]) -> dict[str, dict[str, 
             shares = [gains[:length].max() for length in (len(gains), fifth)]  # candidates are in no order
             greatest.append([shares[0], gains[np.argsort(-rated)[:fifth]].max(), shares[1]])
         keys = ("of all", "of the fifth a glance likes", "of any fifth")
-        found[task] = dict(zip(keys, np.mean(greatest, axis=0, dtype=np.float64).round(5).tolist(), strict=True))
+        found[task] = dict(zip(keys, np.array(greatest, np.float64).mean(axis=0).round(5).tolist(), strict=True))
     return found
 
 
