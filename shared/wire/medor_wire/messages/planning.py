@@ -24,7 +24,8 @@ class PlanRequest(Message):
     seed: int = Field(default=0, ge=0, lt=2**31)
     executor: Executor = "picker"
     exhaustive: bool = False
-    """Roll every candidate out with the method's own model; none is screened out by a rougher one."""
+    """Roll every candidate out with the method's own model; none is screened out by a rougher one. A judged method
+    rolls out as many as `candidates` says, those that a glance likes best of all that were drawn."""
     report: int = Field(default=20, ge=1, le=5000)
     """How many of the best candidates the plan tells."""
 
