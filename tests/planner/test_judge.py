@@ -17,7 +17,18 @@ from medor_planner.judge.judge import ALL, GLANCE, JUDGES, Judge
 from medor_planner.judge.opinions import COARSE, OPINIONS
 from medor_planner.judge.relief import CELL_M, Relief
 from medor_planner.judge.situation import Foreseen, Outcomes, Situation
-from medor_planner.judge.train import Lessons, Options, gained, glanced, judged_unseen, merit, taught, write
+from medor_planner.judge.train import (
+    Lessons,
+    Options,
+    earlier,
+    gained,
+    glanced,
+    judged_unseen,
+    merit,
+    said,
+    taught,
+    write,
+)
 from medor_planner.judge.train import main as train
 from medor_planner.planner import GLANCES, Planner
 from medor_planner.plans import Plans
@@ -223,6 +234,29 @@ def test_what_was_taught_is_what_plans_use(tmp_path):
     judge = Judge.load(ALL, tmp_path / "judge")
     assert judge.names == data.names
     np.testing.assert_allclose(judge.expected(data.values), expected, atol=1e-6)
+
+
+def test_a_judge_goes_on_from_what_another_learnt(tmp_path):
+    """A hurried pupil of few states knows what the first one did of many, and what is new in its own."""
+    many, few = lessons(60), lessons(13)
+    new = replace(few, gains=few.gains + np.float32([0.05, 0]))
+    first = options(tmp_path)
+    write(taught(many.values, many.gains, first), ALL, many, {}, first)
+    hurried = options(tmp_path, start=first.out, lr=1e-3, epochs=100)
+    before, history = earlier(ALL, new, hurried)
+    assert before is not None
+    assert history["data"]["states"] == 60
+    on, anew = (said(taught(new.values, new.gains, hurried, start), new.values) for start in (before, None))
+    off = [np.abs(gains - new.gains).mean(axis=0) for gains in (said(before, new.values), on, anew)]
+    assert off[1][0] < 0.5 * off[0][0]
+    assert (off[1] < off[2]).all()
+
+
+def test_a_judge_does_not_go_on_from_one_of_other_features(tmp_path):
+    data, taught_so = lessons(20), options(tmp_path, epochs=1)
+    write(taught(data.values, data.gains, taught_so), ALL, data, {}, taught_so)
+    with pytest.raises(SystemExit, match="other features"):
+        earlier(ALL, replace(data, names=tuple("abcdef")), options(tmp_path, start=taught_so.out))
 
 
 def test_a_judge_that_knows_other_features_does_not_decide(tmp_path, situation):

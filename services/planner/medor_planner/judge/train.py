@@ -8,6 +8,7 @@ lost is told. Needs torch: `pip install medor-planner[train]`.
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,8 @@ class Options:
     folds: int = 4
     """Of the cross-validation; 0: none."""
     seed: int = 0
+    start: Path | None = None
+    """Folder of judges to go on from, with a smaller `--lr`; their merit is told beside the new ones'."""
 
 
 Lesson = tuple[Situation, NDArray[np.float32], int]
@@ -144,12 +147,17 @@ class Ensemble(nn.Module):
         return torch.stack([member(inputs) for member in self.members]).mean(0) * self.unit
 
 
-def taught(values: NDArray[np.float32], gains: NDArray[np.float32], options: Options) -> Ensemble:
-    """Networks that have learnt from candidates (N, F) and what they brought (N, 2)."""
+def taught(
+    values: NDArray[np.float32], gains: NDArray[np.float32], options: Options, before: Ensemble | None = None
+) -> Ensemble:
+    """Networks that have learnt from candidates (N, F) and what they brought (N, 2), on top of what others know."""
     torch.manual_seed(options.seed)
-    ensemble = Ensemble(values.shape[1], options)
-    ensemble.mean.copy_(torch.from_numpy(values.mean(axis=0)))
-    ensemble.scale.copy_(torch.from_numpy(values.std(axis=0) + 1e-6))
+    if before is None:
+        ensemble = Ensemble(values.shape[1], options)
+        ensemble.mean.copy_(torch.from_numpy(values.mean(axis=0)))
+        ensemble.scale.copy_(torch.from_numpy(values.std(axis=0) + 1e-6))
+    else:
+        ensemble = deepcopy(before).train()
     inputs, targets = ensemble.normalized(torch.from_numpy(values)), torch.from_numpy(gains) / ensemble.unit
     for member in ensemble.members:
         _teach(member, inputs, targets, options)
@@ -170,7 +178,29 @@ def _teach(member: nn.Module, inputs: Tensor, targets: Tensor, options: Options)
             schedule.step()
 
 
-def judged_unseen(data: Lessons, options: Options) -> NDArray[np.float32]:
+def earlier(name: str, data: Lessons, options: Options) -> tuple[Ensemble | None, dict[str, Any]]:
+    """The judge to go on from and how it came about.
+
+    Raises:
+        SystemExit: it was taught with other features.
+        WeightsError: its weights cannot be read, or are of another shape.
+    """
+    if options.start is None:
+        return None, {}
+    ensemble, folder = Ensemble(len(data.names), options), options.start / name
+    history = weights.start(ensemble, folder)
+    if tuple(weights.read_config(folder)["features"]) != data.names:
+        raise SystemExit(f"{folder}: was taught with other features than the models give today")
+    return ensemble.eval(), history
+
+
+def said(ensemble: Ensemble, values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(N, 2) expected gains of candidates with features (N, F)."""
+    with torch.no_grad():
+        return ensemble(torch.from_numpy(values)).numpy()
+
+
+def judged_unseen(data: Lessons, options: Options, before: Ensemble | None = None) -> NDArray[np.float32]:
     """(N, 2) expected gains of every garment's candidates, by networks taught on other garments."""
     fold = np.random.default_rng(options.seed).permutation(np.unique(data.garment))
     fold_of = dict(zip(fold.tolist(), (np.arange(len(fold)) % options.folds).tolist(), strict=True))
@@ -178,9 +208,7 @@ def judged_unseen(data: Lessons, options: Options) -> NDArray[np.float32]:
     found = np.empty_like(data.gains)
     for k in track(range(options.folds), "cross-validation", console=Console(stderr=True), transient=True):
         test = part == k
-        ensemble = taught(data.values[~test], data.gains[~test], options)
-        with torch.no_grad():
-            found[test] = ensemble(torch.from_numpy(data.values[test])).numpy()
+        found[test] = said(taught(data.values[~test], data.gains[~test], options, before), data.values[test])
     return found
 
 
@@ -214,13 +242,13 @@ def merit(ratings: NDArray, gains: NDArray, state: NDArray[np.int64]) -> Merit:
     )
 
 
-def compared(data: Lessons, unseen: dict[str, NDArray[np.float32]]) -> dict[str, dict[str, Merit]]:
+def compared(data: Lessons, expected: dict[str, NDArray[np.float32]]) -> dict[str, dict[str, Merit]]:
     """By task: each judge's merit, each model's, and that of knowing."""
     found: dict[str, dict[str, Merit]] = {}
-    for column, (task, said) in enumerate(zip(TASKS, ("gain", "nearer"), strict=True)):
+    for column, (task, feature) in enumerate(zip(TASKS, ("gain", "nearer"), strict=True)):
         gains = data.gains[:, column]
-        ratings = {f"judge: {name}": expected[:, column] for name, expected in unseen.items()}
-        ratings |= {it.name: data.values[:, data.names.index(f"{it.name} {said}")] for it in OPINIONS}
+        ratings = {f"judge: {name}": gain[:, column] for name, gain in expected.items()}
+        ratings |= {it.name: data.values[:, data.names.index(f"{it.name} {feature}")] for it in OPINIONS}
         ratings["the outcome itself"] = gains
         found[task] = {name: merit(rating, gains, data.state) for name, rating in ratings.items()}
     return found
@@ -265,8 +293,14 @@ def teach_from_outcomes(data: Lessons, options: Options) -> None:
     """The judges that hear models."""
     judges, metrics = {name: opinions for name, opinions in JUDGES.items() if opinions}, {}
     if options.folds:
-        unseen = {name: judged_unseen(data.told(opinions), options) for name, opinions in judges.items()}
-        found = compared(data, unseen)
+        expected = {}
+        for name, opinions in judges.items():
+            told = data.told(opinions)
+            before, _ = earlier(name, told, options)
+            expected[name] = judged_unseen(told, options, before)
+            if before is not None:
+                expected[f"{name} before"] = said(before, told.values)
+        found = compared(data, expected)
         Console().print(table(found))
         metrics = {task: {name: asdict(one) for name, one in merits.items()} for task, merits in found.items()}
     for name, opinions in judges.items():
@@ -277,21 +311,29 @@ def teach_a_glance(data: Lessons, options: Options) -> None:
     """The judge that hears none, of what one that did said."""
     metrics = {}
     if options.folds:
-        metrics = glanced(data, judged_unseen(data, options))
+        metrics = glanced(data, judged_unseen(data, options, earlier(GLANCE, data, options)[0]))
         Console().print_json(data=metrics)
     teach(GLANCE, data, metrics, options)
 
 
 def teach(name: str, data: Lessons, metrics: Mapping[str, Any], options: Options) -> None:
     """One judge, on all there is."""
-    write(taught(data.values, data.gains, options), name, data, metrics, options)
+    before, history = earlier(name, data, options)
+    write(taught(data.values, data.gains, options, before), name, data, metrics, options, history)
     states, garments = data.state[-1] + 1, len(np.unique(data.garment))
     sys.stdout.write(f"{options.out / name}: taught on {states} states of {garments} garments\n")
 
 
-def write(ensemble: Ensemble, name: str, data: Lessons, metrics: Mapping[str, Any], options: Options) -> None:
+def write(
+    ensemble: Ensemble,
+    name: str,
+    data: Lessons,
+    metrics: Mapping[str, Any],
+    options: Options,
+    history: Mapping[str, Any] | None = None,
+) -> None:
     """A folder that `Judge.load` reads."""
-    schedule = {name: value for name, value in asdict(options).items() if name not in ("data", "out")}
+    schedule = {name: value for name, value in asdict(options).items() if name not in ("data", "out", "start")}
     config = {
         "opinions": list(JUDGES[name]),
         "features": list(data.names),
@@ -305,6 +347,7 @@ def write(ensemble: Ensemble, name: str, data: Lessons, metrics: Mapping[str, An
         "schedule": schedule,
         "metrics": metrics,
         "revision": revision(),
+        **({"start": history} if history else {}),
     }
     card = {
         "What it is": "Rates pick-and-place candidates: the gain in coverage and in closeness to the canonical pose to "
@@ -314,6 +357,7 @@ def write(ensemble: Ensemble, name: str, data: Lessons, metrics: Mapping[str, An
         "Schedule": schedule,
         "Metrics": metrics,
         "Revision": str(config["revision"]),
+        **({"It goes on from": history} if history else {}),
     }
     weights.save(options.out / name, ensemble, config, card)
 
