@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from medor_cloth.alignment import canonical_cost
 from medor_cloth.camera import Camera, overhead
@@ -22,6 +21,7 @@ from medor_dynamics.flatten import Flattener
 from medor_dynamics.learned import learned
 from medor_dynamics.physics import Physics, without_layers
 from medor_dynamics.roller import Backend, Roller
+from medor_dynamics.serve import PRECISIONS
 from medor_dynamics.shipped import DEFAULT
 from medor_dynamics.warm_up import warm_up
 from medor_planner.episode import Episodes
@@ -264,7 +264,7 @@ def full_lab(cell: Cell) -> Iterator[Lab]:
         cell,
         layerless=Physics(threads=1, config=without_layers(SolverConfig()), settle_frames=GLANCE_FRAMES),
         coarse=Coarse(threads=1),
-        learned=learned(DEFAULT, 1, torch.bfloat16),
+        learned=learned(DEFAULT, 1, PRECISIONS["auto"]),
     )
     yield lab
     lab.close()

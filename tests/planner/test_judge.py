@@ -239,7 +239,7 @@ def test_what_was_taught_is_what_plans_use(tmp_path):
 def test_a_judge_goes_on_from_what_another_learnt(tmp_path):
     """A hurried pupil of few states knows what the first one did of many, and what is new in its own."""
     many, few = lessons(60), lessons(13)
-    new = replace(few, gains=few.gains + np.float32([0.05, 0]))
+    new = replace(few, gains=few.gains + np.array([0.05, 0], np.float32))
     first = options(tmp_path)
     write(taught(many.values, many.gains, first), ALL, many, {}, first)
     hurried = options(tmp_path, start=first.out, lr=1e-3, epochs=100)
