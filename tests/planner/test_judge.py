@@ -12,8 +12,10 @@ import torch
 from medor_cloth.alignment import canonical_cost
 from medor_cloth.camera import Camera
 from medor_planner.judge import situation as stored
+from medor_planner.judge.collect import Garment
+from medor_planner.judge.collect import Options as CollectOptions
 from medor_planner.judge.features import features
-from medor_planner.judge.judge import ALL, GLANCE, JUDGES, Judge
+from medor_planner.judge.judge import ALL, GLANCE, JUDGES, SHIPPED, Judge
 from medor_planner.judge.opinions import COARSE, OPINIONS
 from medor_planner.judge.relief import CELL_M, Relief
 from medor_planner.judge.situation import Foreseen, Outcomes, Situation
@@ -291,6 +293,21 @@ def test_a_judged_plan_hears_all_models_and_is_the_same_again(full_lab):
     assert (one.candidates, one.survivors) == (30 * GLANCES, 20)
     np.testing.assert_array_equal(one.top_rewards, two.top_rewards)
     assert one.no_op == (one.top_rewards.max() <= one.no_op_reward)
+
+
+@pytest.mark.parametrize("judge", [SHIPPED, None])
+def test_what_is_collected_can_be_learnt_from(full_lab, tmp_path, judge):
+    for folder in (stored.DECISIONS, stored.GLANCES):
+        (tmp_path / folder).mkdir()
+    few = CollectOptions(tmp_path, pulls=1, drawn=12, best=2, others=1, judge=judge)
+    Garment(full_lab.bus, few, "tshirt", 600_900).collect()
+    drawn, outcomes = stored.load(tmp_path / stored.DECISIONS / "tshirt-600900-0.npz")
+    assert set(drawn.foreseen) == {opinion.name for opinion in OPINIONS}
+    assert (len(drawn.candidates), len(outcomes.coverage_m2)) == (3, 4)
+    assert 0 < outcomes.coverage_m2[0] < outcomes.flat_coverage_m2
+    Garment(full_lab.bus, replace(few, glances=True), "tshirt", 600_900).collect()
+    glance, gains, seed = stored.load_glance(tmp_path / stored.GLANCES / "tshirt-600900-0.npz")
+    assert (dict(glance.foreseen), len(gains), seed) == ({}, 12, 600_900)
 
 
 class LikesLongPulls:

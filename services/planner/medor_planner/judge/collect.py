@@ -1,17 +1,21 @@
 """What the judge learns from: `python -m medor_planner.judge.collect --states 400 --out data/judge --shard 0/2`.
 
 Starts a simulated cell and unfolds garments of the training seeds. At every state the models foresee what some
-candidates would do, on the meshes that reconstruction makes of the view, and the cloth solver rolls the same
-candidates out on the true garment. Then one of them is carried out: what the last judge likes best, the truly best
-one, or any. So a judge learns from where the one before it leads. A glance learns to say at once what the last judge
-says of candidates when it has heard the rough model; `--glances` collects only that, several times as fast. One file a
-state in `decisions` and `glances`; kill it and start it again: it goes on.
+candidates would do, those that the last glance likes and some others, on the meshes that reconstruction makes of the
+view, and the cloth solver rolls the same candidates out on the true garment. Then one of them is carried out: what the
+last judge likes best, the truly best one, or any. So a judge learns from where the one before it leads.
+
+A glance learns to say at once what the last judge says of candidates when it has heard the rough model: `--glances`
+collects that instead, several times as fast, when the other judges are taught. One file a state in `decisions` or
+`glances`; kill it and start it again: it goes on.
 """
 
 import sys
 import threading
 import uuid
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,13 +27,13 @@ from medor_cloth.alignment import canonical_cost
 from medor_cloth.coverage import coverages
 from medor_planner.executor import Executor
 from medor_planner.goals import Goals, canonical_of
-from medor_planner.judge.judge import ALL, SCREEN, SHIPPED, TASKS, Judge
-from medor_planner.judge.opinions import COARSE, OPINIONS, consulted, reconstructed
+from medor_planner.judge.judge import ALL, GLANCE, SCREEN, SHIPPED, TASKS, Judge
+from medor_planner.judge.opinions import COARSE, OPINIONS, Opinion, consulted, reconstructed
 from medor_planner.judge.situation import DECISIONS, GLANCES, Outcomes, Situation, save, save_glance
 from medor_planner.plans import Plans
 from medor_planner.sampling import Scene, sample
 from medor_planner.screening import SCREEN_CHUNK, best
-from medor_planner.shooting import Shooting
+from medor_planner.shooting import CHUNK, Shooting
 from medor_wire import endpoints
 from medor_wire.bus import Bus
 from medor_wire.errors import MedorError
@@ -37,6 +41,7 @@ from medor_wire.launcher import Launcher, heed_signals
 from medor_wire.messages import (
     ActRequest,
     Category,
+    ClothMesh,
     Empty,
     ReachRequest,
     ResetRequest,
@@ -66,14 +71,14 @@ class Options:
     """Of the garments; others than the last judge learnt from make its merit and the next one's comparable."""
     pulls: int = 7
     """States of one garment, each a pull after the last."""
-    drawn: int = 200
+    drawn: int = 500
     """Candidates drawn at a state."""
-    best: int = 14
-    """Of these, taken as the screening judge rates them, half of them for each task."""
+    best: int = 20
+    """Of these, taken as the last glance rates them for the garment's task."""
     others: int = 10
     """Of the rest, taken at random."""
     glances: bool = False
-    """Leave out the other models and what truly comes."""
+    """What the last judge says of all of them, who has heard the rough model; nothing of what truly comes."""
     judge: Path | None = SHIPPED
     """Folder of the last judge's weights; `None`: there is none that knows today's features, models are trusted."""
 
@@ -136,14 +141,15 @@ class Garment:
         mesh = meshes[OPINIONS[0].recon]
         candidates = sample(Scene(mesh, view), self._options.drawn, self._rng, reachable=self._reachable)
         goals = self._goals.of(canonical_of(mesh), self._never)
-        rough = consulted(self._bus, [COARSE], meshes, candidates, self._never, chunk=SCREEN_CHUNK)
-        drawn = Situation(view, mesh, candidates, goals, rough)
-        gains, truth = self._gains(drawn, SCREEN), None
-        save_glance(self._options.out / GLANCES / name, drawn, gains, self._seed)
-        if not self._options.glances:
-            drawn = drawn.among(self._some(gains))
-            others = [opinion for opinion in OPINIONS if opinion is not COARSE]
-            drawn = drawn.hearing(consulted(self._bus, others, meshes, drawn.candidates, self._never))
+        drawn = Situation(view, mesh, candidates, goals, {})
+        roughly, truth = partial(self._hearing, [COARSE], meshes, chunk=SCREEN_CHUNK), None
+        if self._options.glances:
+            drawn = roughly(drawn)
+            gains = self._gains(drawn, SCREEN)
+            save_glance(self._options.out / GLANCES / name, drawn, gains, self._seed)
+        else:
+            drawn = drawn.among(self._some(self._gains(drawn if self._options.judge else roughly(drawn), GLANCE)))
+            drawn = self._hearing(OPINIONS, meshes, drawn)
             outcomes = self._outcomes(drawn)
             save(self._options.out / DECISIONS / name, drawn, outcomes)
             gains, truth = self._gains(drawn, ALL), np.stack([outcomes.coverage_m2, -outcomes.cost_m], axis=1)[1:]
@@ -158,19 +164,23 @@ class Garment:
     def _reachable(self, picks: NDArray[np.float32], places: NDArray[np.float32]) -> NDArray[np.bool_]:
         return self._bus.ask(endpoints.REACH, ReachRequest(points=picks, places=places)).reachable
 
+    def _hearing(
+        self, opinions: Sequence[Opinion], meshes: Mapping[str, ClothMesh], situation: Situation, chunk: int = CHUNK
+    ) -> Situation:
+        """The same decision when models have been heard about all its candidates."""
+        return situation.hearing(consulted(self._bus, opinions, meshes, situation.candidates, self._never, chunk=chunk))
+
     def _some(self, gains: NDArray) -> NDArray[np.bool_]:
-        """(K,) the best of the candidates, as the screen rates them (K, 2) for either task, and some of the others."""
-        chosen = np.zeros(len(gains), np.bool_)
-        for column in gains.T:
-            chosen |= best(column, self._options.best // 2)
+        """(K,) the best of the candidates, by what is expected of them (K, 2), and some of the others."""
+        chosen = best(gains[:, TASKS.index(self._task)], self._options.best)
         chosen[self._rng.permutation(np.flatnonzero(~chosen))[: self._options.others]] = True
         return chosen
 
     def _gains(self, situation: Situation, judge: str) -> NDArray:
-        """(K, 2) what to expect of candidates: what the last judge says or, without one, the first model heard."""
+        """(K, 2) what to expect of candidates: what the last judge says or, without one, the rough model."""
         if self._options.judge:
             return Judge.load(judge, self._options.judge).gains(situation)
-        first, goals = next(iter(situation.foreseen.values())), situation.goals
+        first, goals = situation.foreseen[COARSE.name], situation.goals
         covered = coverages(first.positions, first.mesh.faces, threads=1) / goals.flat_coverage_m2
         cost = canonical_cost(first.positions, goals.goals)
         return np.stack([covered[1:] - covered[0], cost[0] - cost[1:]], axis=1)
