@@ -56,7 +56,7 @@ class Planner:
         self._goals = Goals(bus)
         self._chunk, self._glances = chunk, glances
         self._screening = screening or Screening()
-        self._hearing = Hearing(bus, self._goals, judge, self._screening, chunk)
+        self._hearing = Hearing(bus, self._goals, judge, chunk)
 
     def plan(self, request: PlanRequest, call: Call) -> Plan:
         """The best of `request.candidates` sampled actions, or doing nothing when that is predicted best.

@@ -10,7 +10,7 @@ from medor_planner.judge.judge import ALL, GLANCE, Judge
 from medor_planner.judge.opinions import OPINIONS, consulted, reconstructed
 from medor_planner.judge.situation import Situation
 from medor_planner.sampling import Candidates, Scene
-from medor_planner.screening import Screening, best
+from medor_planner.screening import AT_LEAST, best
 from medor_planner.shooting import CHUNK
 from medor_planner.watching import Stages
 from medor_wire.bus import Bus
@@ -24,7 +24,6 @@ class Hearing:
         bus: where models are asked.
         goals: keeps goal poses.
         judge: loads one of the judges by name.
-        screening: how many candidates all models are heard about.
         chunk: candidates per request.
     """
 
@@ -33,10 +32,9 @@ class Hearing:
         bus: Bus,
         goals: Goals,
         judge: Callable[[str], Judge],
-        screening: Screening,
         chunk: int = CHUNK,
     ) -> None:
-        self._bus, self._goals, self._screening, self._chunk = bus, goals, screening, chunk
+        self._bus, self._goals, self._chunk = bus, goals, chunk
         self._judge = cache(judge)
 
     def choice(
@@ -62,7 +60,7 @@ class Hearing:
         with stages.stage("goals"):
             goals = self._goals.of(canonical_of(scene.mesh), cancel)
 
-        count = request.candidates if request.exhaustive else self._screening.leaves(request.candidates)
+        count = request.candidates if request.exhaustive else min(request.candidates, AT_LEAST)
         case = Situation(scene.view, scene.mesh, drawn, goals, {})
         if len(drawn) > count:
             with stages.stage("screen"):
