@@ -16,21 +16,12 @@ from medor_planner.judge.collect import Garment
 from medor_planner.judge.collect import Options as CollectOptions
 from medor_planner.judge.features import features
 from medor_planner.judge.judge import ALL, GLANCE, JUDGES, SHIPPED, Judge
+from medor_planner.judge.lessons import Lessons, gained
+from medor_planner.judge.merit import glanced, merit
 from medor_planner.judge.opinions import COARSE, OPINIONS
 from medor_planner.judge.relief import CELL_M, Relief
 from medor_planner.judge.situation import Foreseen, Outcomes, Situation
-from medor_planner.judge.train import (
-    Lessons,
-    Options,
-    earlier,
-    gained,
-    glanced,
-    judged_unseen,
-    merit,
-    said,
-    taught,
-    write,
-)
+from medor_planner.judge.train import Options, earlier, judged_unseen, said, taught, write
 from medor_planner.judge.train import main as train
 from medor_planner.planner import GLANCES, Planner
 from medor_planner.plans import Plans

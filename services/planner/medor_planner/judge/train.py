@@ -7,9 +7,9 @@ lost is told. Needs torch: `pip install medor-planner[train]`.
 """
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +19,17 @@ import tyro
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
-from rich.table import Table
-from scipy.stats import rankdata
 from torch import Tensor, nn
 
 from medor_learn import weights
 from medor_learn.revision import revision
-from medor_planner.judge.features import features
 from medor_planner.judge.judge import GLANCE, JUDGES, LIMIT, TASKS
-from medor_planner.judge.opinions import OPINIONS
-from medor_planner.judge.situation import DECISIONS, GLANCES, Outcomes, Situation, load, load_glance
+from medor_planner.judge.lessons import Lessons, outcome
+from medor_planner.judge.merit import compared, glanced, table
+from medor_planner.judge.situation import DECISIONS, GLANCES, load_glance
 
 UNIT = (0.05, 0.008)
 """Typical gains: share of the flat coverage, metres of canonical cost."""
-LOST_M = 0.1
-"""Canonical cost of a vertex that leaves the picture, on top of its own [m]."""
 
 
 @dataclass(frozen=True)
@@ -58,62 +54,6 @@ class Options:
     seed: int = 0
     start: Path | None = None
     """Folder of judges to go on from, with a smaller `--lr`; their merit is told beside the new ones'."""
-
-
-Lesson = tuple[Situation, NDArray[np.float32], int]
-"""What is known of K candidates, their gains (K, 2) and the garment's seed."""
-
-
-@dataclass(frozen=True, eq=False)
-class Lessons:
-    """All candidates of all states.
-
-    Attributes:
-        names: (F) features.
-        values: (N, F).
-        gains: (N, 2) share of the flat coverage, metres of canonical cost; what has left the picture is lost.
-        state: (N,) number of the state.
-        garment: (N,) seed of the garment.
-    """
-
-    names: tuple[str, ...]
-    values: NDArray[np.float32]
-    gains: NDArray[np.float32]
-    state: NDArray[np.int64]
-    garment: NDArray[np.int64]
-
-    @classmethod
-    def read(cls, paths: Sequence[Path], lesson: Callable[[Path], Lesson]) -> "Lessons":
-        """All states that were collected."""
-        names: tuple[str, ...] = ()
-        rows, gains, garment = [], [], []
-        for path in track(paths, "features", console=Console(stderr=True), transient=True):
-            situation, gain, seed = lesson(path)
-            names, values = features(situation)
-            rows.append(values)
-            gains.append(gain)
-            garment.append(np.full(len(values), seed))
-        state = np.repeat(np.arange(len(rows)), [len(values) for values in rows])
-        return cls(names, np.concatenate(rows), np.concatenate(gains), state, np.concatenate(garment))
-
-    def told(self, opinions: Sequence[str]) -> "Lessons":
-        """The same, when only some opinions are known."""
-        silent = tuple(f"{opinion.name} " for opinion in OPINIONS if opinion.name not in opinions)
-        kept = [i for i, name in enumerate(self.names) if not name.startswith(silent)] if silent else slice(None)
-        return replace(self, names=tuple(np.array(self.names)[kept].tolist()), values=self.values[:, kept])
-
-
-def outcome(path: Path) -> Lesson:
-    """A decision of which all models were heard, and what truly came."""
-    situation, outcomes = load(path)
-    return situation.heard(opinion.name for opinion in OPINIONS), gained(outcomes), outcomes.seed
-
-
-def gained(outcomes: Outcomes) -> NDArray[np.float32]:
-    """(K, 2) what the candidates brought."""
-    covered = outcomes.coverage_m2 * outcomes.in_view / outcomes.flat_coverage_m2
-    cost = outcomes.cost_m + LOST_M * (1 - outcomes.in_view)
-    return np.stack([covered[1:] - covered[0], cost[0] - cost[1:]], axis=1).astype(np.float32)
 
 
 class Ensemble(nn.Module):
@@ -209,72 +149,6 @@ def judged_unseen(data: Lessons, options: Options, before: Ensemble | None = Non
     for k in track(range(options.folds), "cross-validation", console=Console(stderr=True), transient=True):
         test = part == k
         found[test] = said(taught(data.values[~test], data.gains[~test], options, before), data.values[test])
-    return found
-
-
-@dataclass(frozen=True)
-class Merit:
-    """How well something rates the candidates of a state, mean over states.
-
-    Attributes:
-        rank: Spearman correlation with what they brought.
-        gain: what its favourite brought, 0 where it likes nothing better than doing nothing.
-        error: standard error of that.
-    """
-
-    rank: float
-    gain: float
-    error: float
-
-
-def merit(ratings: NDArray, gains: NDArray, state: NDArray[np.int64]) -> Merit:
-    """Of ratings (N,), where 0 is doing nothing."""
-    ranks, favourites = [], []
-    for one in np.unique(state):
-        rated, brought = ratings[state == one], gains[state == one]
-        differ = np.ptp(rated) > 0 and np.ptp(brought) > 0
-        ranks.append(np.corrcoef(rankdata(rated), rankdata(brought))[0, 1] if differ else 0.0)
-        favourites.append(brought[rated.argmax()] if rated.max() > 0 else 0.0)
-    return Merit(
-        round(float(np.mean(ranks)), 4),
-        round(float(np.mean(favourites)), 5),
-        round(float(np.std(favourites)) / len(favourites) ** 0.5, 5),
-    )
-
-
-def compared(data: Lessons, expected: dict[str, NDArray[np.float32]]) -> dict[str, dict[str, Merit]]:
-    """By task: each judge's merit, each model's, and that of knowing."""
-    found: dict[str, dict[str, Merit]] = {}
-    for column, (task, feature) in enumerate(zip(TASKS, ("gain", "nearer"), strict=True)):
-        gains = data.gains[:, column]
-        ratings = {f"judge: {name}": gain[:, column] for name, gain in expected.items()}
-        ratings |= {it.name: data.values[:, data.names.index(f"{it.name} {feature}")] for it in OPINIONS}
-        ratings["the outcome itself"] = gains
-        found[task] = {name: merit(rating, gains, data.state) for name, rating in ratings.items()}
-    return found
-
-
-def table(found: dict[str, dict[str, Merit]]) -> Table:
-    out = Table("task", "rated by", "rank correlation", "its favourite brings")
-    for task, merits in found.items():
-        for name, one in merits.items():
-            out.add_row(task, name, f"{one.rank:.3f}", f"{one.gain:.4f} ± {one.error:.4f}")
-    return out
-
-
-def glanced(data: Lessons, ratings: NDArray[np.float32]) -> dict[str, dict[str, float]]:
-    """By task: the greatest gain (as the teacher says) of a state's candidates, of the fifth that ratings (N, 2) like
-    best, and of any fifth; means over states."""
-    found = {}
-    for column, task in enumerate(TASKS):
-        greatest = []
-        for one in np.unique(data.state):
-            gains, rated = data.gains[data.state == one, column], ratings[data.state == one, column]
-            fifth = -(-len(gains) // 5)
-            shares = [gains[:length].max() for length in (len(gains), fifth)]  # candidates are in no order
-            greatest.append([shares[0], gains[np.argsort(-rated)[:fifth]].max(), shares[1]])
-        keys = ("of all", "of the fifth a glance likes", "of any fifth")
-        found[task] = dict(zip(keys, np.array(greatest, np.float64).mean(axis=0).round(5).tolist(), strict=True))
     return found
 
 

@@ -1,0 +1,72 @@
+"""What a judge is taught and examined with: all candidates of all states that were collected."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+
+from medor_planner.judge.features import features
+from medor_planner.judge.opinions import OPINIONS
+from medor_planner.judge.situation import Outcomes, Situation, load
+
+LOST_M = 0.1
+"""Canonical cost of a vertex that leaves the picture, on top of its own [m]."""
+
+Lesson = tuple[Situation, NDArray[np.float32], int]
+"""What is known of K candidates, their gains (K, 2) and the garment's seed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lessons:
+    """All candidates of all states.
+
+    Attributes:
+        names: (F) features.
+        values: (N, F).
+        gains: (N, 2) share of the flat coverage, metres of canonical cost; what has left the picture is lost.
+        state: (N,) number of the state.
+        garment: (N,) seed of the garment.
+    """
+
+    names: tuple[str, ...]
+    values: NDArray[np.float32]
+    gains: NDArray[np.float32]
+    state: NDArray[np.int64]
+    garment: NDArray[np.int64]
+
+    @classmethod
+    def read(cls, paths: Sequence[Path], lesson: Callable[[Path], Lesson]) -> "Lessons":
+        """All states that were collected."""
+        names: tuple[str, ...] = ()
+        rows, gains, garment = [], [], []
+        for path in track(paths, "features", console=Console(stderr=True), transient=True):
+            situation, gain, seed = lesson(path)
+            names, values = features(situation)
+            rows.append(values)
+            gains.append(gain)
+            garment.append(np.full(len(values), seed))
+        state = np.repeat(np.arange(len(rows)), [len(values) for values in rows])
+        return cls(names, np.concatenate(rows), np.concatenate(gains), state, np.concatenate(garment))
+
+    def told(self, opinions: Sequence[str]) -> "Lessons":
+        """The same, when only some opinions are known."""
+        silent = tuple(f"{opinion.name} " for opinion in OPINIONS if opinion.name not in opinions)
+        kept = [i for i, name in enumerate(self.names) if not name.startswith(silent)] if silent else slice(None)
+        return replace(self, names=tuple(np.array(self.names)[kept].tolist()), values=self.values[:, kept])
+
+
+def outcome(path: Path) -> Lesson:
+    """A decision of which all models were heard, and what truly came."""
+    situation, outcomes = load(path)
+    return situation.heard(opinion.name for opinion in OPINIONS), gained(outcomes), outcomes.seed
+
+
+def gained(outcomes: Outcomes) -> NDArray[np.float32]:
+    """(K, 2) what the candidates brought."""
+    covered = outcomes.coverage_m2 * outcomes.in_view / outcomes.flat_coverage_m2
+    cost = outcomes.cost_m + LOST_M * (1 - outcomes.in_view)
+    return np.stack([covered[1:] - covered[0], cost[0] - cost[1:]], axis=1).astype(np.float32)

@@ -1,0 +1,78 @@
+"""How well something rates the candidates of states that it has not seen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.table import Table
+from scipy.stats import rankdata
+
+from medor_planner.judge.judge import TASKS
+from medor_planner.judge.lessons import Lessons
+from medor_planner.judge.opinions import OPINIONS
+
+
+@dataclass(frozen=True)
+class Merit:
+    """How well something rates the candidates of a state, mean over states.
+
+    Attributes:
+        rank: Spearman correlation with what they brought.
+        gain: what its favourite brought, 0 where it likes nothing better than doing nothing.
+        error: standard error of that.
+    """
+
+    rank: float
+    gain: float
+    error: float
+
+
+def merit(ratings: NDArray, gains: NDArray, state: NDArray[np.int64]) -> Merit:
+    """Of ratings (N,), where 0 is doing nothing."""
+    ranks, favourites = [], []
+    for one in np.unique(state):
+        rated, brought = ratings[state == one], gains[state == one]
+        differ = np.ptp(rated) > 0 and np.ptp(brought) > 0
+        ranks.append(np.corrcoef(rankdata(rated), rankdata(brought))[0, 1] if differ else 0.0)
+        favourites.append(brought[rated.argmax()] if rated.max() > 0 else 0.0)
+    return Merit(
+        round(float(np.mean(ranks)), 4),
+        round(float(np.mean(favourites)), 5),
+        round(float(np.std(favourites)) / len(favourites) ** 0.5, 5),
+    )
+
+
+def compared(data: Lessons, expected: dict[str, NDArray[np.float32]]) -> dict[str, dict[str, Merit]]:
+    """By task: each judge's merit, each model's, and that of knowing."""
+    found: dict[str, dict[str, Merit]] = {}
+    for column, (task, feature) in enumerate(zip(TASKS, ("gain", "nearer"), strict=True)):
+        gains = data.gains[:, column]
+        ratings = {f"judge: {name}": gain[:, column] for name, gain in expected.items()}
+        ratings |= {it.name: data.values[:, data.names.index(f"{it.name} {feature}")] for it in OPINIONS}
+        ratings["the outcome itself"] = gains
+        found[task] = {name: merit(rating, gains, data.state) for name, rating in ratings.items()}
+    return found
+
+
+def table(found: dict[str, dict[str, Merit]]) -> Table:
+    out = Table("task", "rated by", "rank correlation", "its favourite brings")
+    for task, merits in found.items():
+        for name, one in merits.items():
+            out.add_row(task, name, f"{one.rank:.3f}", f"{one.gain:.4f} ± {one.error:.4f}")
+    return out
+
+
+def glanced(data: Lessons, ratings: NDArray[np.float32]) -> dict[str, dict[str, float]]:
+    """By task: the greatest gain (as the teacher says) of a state's candidates, of the fifth that ratings (N, 2) like
+    best, and of any fifth; means over states."""
+    found = {}
+    for column, task in enumerate(TASKS):
+        greatest = []
+        for one in np.unique(data.state):
+            gains, rated = data.gains[data.state == one, column], ratings[data.state == one, column]
+            fifth = -(-len(gains) // 5)
+            shares = [gains[:length].max() for length in (len(gains), fifth)]  # candidates are in no order
+            greatest.append([shares[0], gains[np.argsort(-rated)[:fifth]].max(), shares[1]])
+        keys = ("of all", "of the fifth a glance likes", "of any fifth")
+        found[task] = dict(zip(keys, np.array(greatest, np.float64).mean(axis=0).round(5).tolist(), strict=True))
+    return found
