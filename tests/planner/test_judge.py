@@ -198,8 +198,8 @@ def test_a_glance_that_knows_the_gains_misses_none():
     data = lessons(20)
     knows, guesses = glanced(data, data.gains), glanced(data, np.zeros_like(data.gains))
     for task in ("flatten", "canonicalize"):
-        assert knows[task]["of the fifth a glance likes"] == knows[task]["of all"]
-        assert guesses[task]["of the fifth a glance likes"] < knows[task]["of all"]
+        assert knows[task]["of those a glance likes"] == knows[task]["of the best"]
+        assert guesses[task]["of those a glance likes"] < knows[task]["of the best"]
 
 
 def test_both_kinds_of_judges_are_taught_from_what_was_collected(situation, tmp_path):

@@ -11,6 +11,9 @@ from medor_planner.judge.judge import TASKS
 from medor_planner.judge.lessons import Lessons
 from medor_planner.judge.opinions import OPINIONS
 
+FEW = 25
+"""A glance leaves one candidate in so many to be rolled out: 20 of 500."""
+
 
 @dataclass(frozen=True)
 class Merit:
@@ -63,16 +66,15 @@ def table(found: dict[str, dict[str, Merit]]) -> Table:
 
 
 def glanced(data: Lessons, ratings: NDArray[np.float32]) -> dict[str, dict[str, float]]:
-    """By task: the greatest gain (as the teacher says) of a state's candidates, of the fifth that ratings (N, 2) like
-    best, and of any fifth; means over states."""
+    """By task: mean gain (as the teacher says) of the few candidates of a state that are best, of those that ratings
+    (N, 2) like best, and of all; means over states."""
     found = {}
     for column, task in enumerate(TASKS):
-        greatest = []
+        means = []
         for one in np.unique(data.state):
             gains, rated = data.gains[data.state == one, column], ratings[data.state == one, column]
-            fifth = -(-len(gains) // 5)
-            shares = [gains[:length].max() for length in (len(gains), fifth)]  # candidates are in no order
-            greatest.append([shares[0], gains[np.argsort(-rated)[:fifth]].max(), shares[1]])
-        keys = ("of all", "of the fifth a glance likes", "of any fifth")
-        found[task] = dict(zip(keys, np.array(greatest, np.float64).mean(axis=0).round(5).tolist(), strict=True))
+            few = -(-len(gains) // FEW)
+            means.append([np.sort(gains)[-few:].mean(), gains[np.argsort(-rated)[:few]].mean(), gains.mean()])
+        keys = ("of the best", "of those a glance likes", "of all")
+        found[task] = dict(zip(keys, np.array(means, np.float64).mean(axis=0).round(5).tolist(), strict=True))
     return found
