@@ -52,6 +52,8 @@ class Waiter:
             return codec.decode(self._endpoint.reply, answer.frame)
         if answer.kind == "error":
             raise answer.error or InternalError(f"{self._endpoint.name} failed without saying why")
+        if time.monotonic() >= self._deadline:  # the transport's clock rang first
+            raise self._too_late()
         raise Unavailable(f"{self._endpoint.name} gave no answer: the server vanished or may not be asked")
 
     def _next(self) -> Answer:

@@ -28,6 +28,8 @@ FRAME = zenoh.Encoding("application/vnd.medor.frame")
 ERROR = zenoh.Encoding("application/vnd.medor.error")
 PROGRESS = b"progress"
 JOIN_S = 1.0
+LATE_S = 1.0
+"""A query is kept so much longer than its asker waits: who runs out of time was not left without an answer."""
 CLOSE_S = 3.0
 """Closing a session is known to hang at times; a process leaves all the same."""
 
@@ -126,7 +128,7 @@ class ZenohTransport:
                 payload=frame,
                 encoding=FRAME,
                 attachment=attachment,
-                timeout=timeout_s,
+                timeout=timeout_s + LATE_S,
                 # Without it only the last of several replies is delivered.
                 consolidation=zenoh.ConsolidationMode.NONE,
                 congestion_control=zenoh.CongestionControl.BLOCK,
