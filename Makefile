@@ -12,6 +12,7 @@ SEED ?= 1
 PICKS ?= 10
 CANDIDATES ?= 100
 BENCH ?=
+WORKERS ?= 2
 
 .PHONY: help setup demo up doctor test test-all check format bench clean
 
@@ -35,8 +36,8 @@ up: setup  ## Run the simulated cell with its HTTP door until Ctrl-C
 doctor: setup  ## What is installed, what runs, what to do about it
 	$(BIN)/medor doctor
 
-test: setup  ## The fast tests, warnings as errors
-	$(BIN)/python -m pytest -m "not slow and not gpu and not hardware"
+test: setup  ## The fast tests, two files at a time (WORKERS=2), warnings as errors
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow and not gpu and not hardware"
 
 test-all: setup  ## Every test this machine can run
 	$(BIN)/python -m pytest -m "not gpu and not hardware"
