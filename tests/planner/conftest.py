@@ -26,9 +26,11 @@ from medor_dynamics.shipped import DEFAULT
 from medor_dynamics.warm_up import warm_up
 from medor_planner.episode import Episodes
 from medor_planner.executor import Executor
+from medor_planner.judge.opinions import OPINIONS
+from medor_planner.judge.situation import Foreseen, Situation
 from medor_planner.planner import Planner
 from medor_planner.plans import Plans
-from medor_planner.sampling import Scene
+from medor_planner.sampling import Scene, anywhere, sample
 from medor_recon.reconstructor import Reconstructor
 from medor_wire import endpoints
 from medor_wire.bus import Call
@@ -42,6 +44,7 @@ from medor_wire.messages import (
     ClothMesh,
     DepthView,
     Empty,
+    GoalSet,
     Lease,
     LeaseRequest,
     Reach,
@@ -51,6 +54,7 @@ from medor_wire.messages import (
     Truth,
 )
 from medor_wire.motion import Check, Motion
+from tests.planner.decisions import COUNT
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -78,6 +82,30 @@ def sheet_scene(camera: Camera) -> Callable[..., Scene]:
         return Scene(mesh, view_of(vertices, faces, camera))
 
     return make
+
+
+@pytest.fixture
+def situation(sheet_scene: Callable[..., Scene]) -> Situation:
+    """A sheet with one side folded over. The models foresee that all of it goes with the pull, more or less."""
+    scene = sheet_scene(folded=True)
+    flat = sheet_scene().mesh.vertices
+    rng = np.random.default_rng(0)
+    uneven = rng.normal(0, 5e-4, flat.shape).astype(np.float32)  # no two vertices just as far apart as a threshold
+    mesh = scene.mesh.model_copy(
+        update={
+            "vertices": scene.mesh.vertices + uneven,
+            "canonical": flat,
+            "confidence": np.linspace(0, 1, len(flat), dtype="f4"),
+        }
+    )
+    candidates = sample(scene, COUNT, rng, reachable=lambda picks, places: anywhere(picks))
+    pulls = np.concatenate([np.zeros((1, 3)), candidates.places - candidates.picks]).astype(np.float32)
+    share = np.linspace(0, 1, len(flat), dtype=np.float32)[:, None]
+    foreseen = {
+        opinion.name: Foreseen(mesh, (mesh.vertices + part * share * pulls[:, None]).astype(np.float32))
+        for opinion, part in zip(OPINIONS, (1.0, 0.5, 0.2, 0.8), strict=True)
+    }
+    return Situation(scene.view, mesh, candidates, GoalSet(goals=flat[None], flat_coverage_m2=0.048), foreseen)
 
 
 def sheet(width: float, length: float, edge: float = 0.02) -> tuple[np.ndarray, np.ndarray]:

@@ -1,9 +1,7 @@
 """The judge: told what models foresee and what is seen, says what an action will bring."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,70 +13,23 @@ from medor_planner.judge import situation as stored
 from medor_planner.judge.collect import Garment
 from medor_planner.judge.collect import Options as CollectOptions
 from medor_planner.judge.features import features
-from medor_planner.judge.judge import ALL, GLANCE, JUDGES, SHIPPED, Judge
+from medor_planner.judge.glance import Glance
+from medor_planner.judge.judge import SHIPPED, Judge
 from medor_planner.judge.lessons import Lessons, gained
-from medor_planner.judge.merit import glanced, merit
+from medor_planner.judge.merit import best_few, merit
 from medor_planner.judge.opinions import COARSE, OPINIONS
 from medor_planner.judge.relief import CELL_M, Relief
-from medor_planner.judge.situation import Foreseen, Outcomes, Situation
+from medor_planner.judge.situation import Outcomes, Situation
 from medor_planner.judge.train import Options, earlier, judged_unseen, said, taught, write
 from medor_planner.judge.train import main as train
 from medor_planner.planner import GLANCES, Planner
 from medor_planner.plans import Plans
-from medor_planner.sampling import Candidates, Scene, anywhere, sample
+from medor_planner.sampling import Candidates
 from medor_wire import endpoints
 from medor_wire.bus import Call
 from medor_wire.errors import BadRequest, NoGarment
-from medor_wire.messages import CameraInfo, ClothMesh, DepthView, GoalSet, PlanRequest
-
-COUNT = 12
-
-
-@pytest.fixture
-def situation(sheet_scene: Callable[..., Scene]) -> Situation:
-    """A sheet with one side folded over. The models foresee that all of it goes with the pull, more or less."""
-    scene = sheet_scene(folded=True)
-    flat = sheet_scene().mesh.vertices
-    rng = np.random.default_rng(0)
-    uneven = rng.normal(0, 5e-4, flat.shape).astype(np.float32)  # no two vertices just as far apart as a threshold
-    mesh = scene.mesh.model_copy(
-        update={
-            "vertices": scene.mesh.vertices + uneven,
-            "canonical": flat,
-            "confidence": np.linspace(0, 1, len(flat), dtype="f4"),
-        }
-    )
-    candidates = sample(scene, COUNT, rng, reachable=lambda picks, places: anywhere(picks))
-    pulls = np.concatenate([np.zeros((1, 3)), candidates.places - candidates.picks]).astype(np.float32)
-    share = np.linspace(0, 1, len(flat), dtype=np.float32)[:, None]
-    foreseen = {
-        opinion.name: Foreseen(mesh, (mesh.vertices + part * share * pulls[:, None]).astype(np.float32))
-        for opinion, part in zip(OPINIONS, (1.0, 0.5, 0.2, 0.8), strict=True)
-    }
-    return Situation(scene.view, mesh, candidates, GoalSet(goals=flat[None], flat_coverage_m2=0.048), foreseen)
-
-
-def turned(situation: Situation, heading: float, shift: tuple[float, float]) -> Situation:
-    """The same decision elsewhere: table, cloth and camera together."""
-    T = np.eye(4)
-    T[:2, :2] = [[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]]
-    T[:2, 3] = shift
-
-    def move(points: np.ndarray) -> np.ndarray:
-        return (points @ T[:3, :3].T + T[:3, 3]).astype(np.float32)
-
-    def lying(mesh: ClothMesh) -> ClothMesh:
-        return mesh.model_copy(update={"vertices": move(mesh.vertices)})
-
-    info = situation.view.camera
-    camera = info.model_copy(update={"T_world_camera": T @ info.T_world_camera})
-    return Situation(
-        situation.view.model_copy(update={"camera": camera}),
-        lying(situation.mesh),
-        Candidates(move(situation.candidates.picks), move(situation.candidates.places)),
-        situation.goals.model_copy(update={"goals": move(situation.goals.goals)}),
-        {name: Foreseen(lying(one.mesh), move(one.positions)) for name, one in situation.foreseen.items()},
-    )
+from medor_wire.messages import CameraInfo, DepthView, PlanRequest
+from tests.planner.decisions import COUNT, turned
 
 
 def test_a_relief_measures_what_is_seen(sheet_scene, camera):
@@ -109,9 +60,12 @@ def test_features_do_not_depend_on_where_the_garment_lies_nor_how_it_is_turned(s
 def test_each_candidate_has_features_of_its_own(situation):
     order = np.random.default_rng(1).permutation(COUNT)
     some = situation.candidates
+    glanced = np.random.default_rng(2).normal(size=(COUNT, 2)).astype(np.float32)
+    situation = replace(situation, glanced=glanced)
     other = replace(
         situation,
         candidates=Candidates(some.picks[order], some.places[order]),
+        glanced=glanced[order],
         foreseen={
             name: replace(one, positions=one.positions[[0, *(order + 1)]]) for name, one in situation.foreseen.items()
         },
@@ -135,17 +89,9 @@ def test_what_is_stored_comes_back(situation, tmp_path):
     np.testing.assert_allclose(features(again)[1], features(situation)[1], atol=0.02)
 
 
-def test_what_a_glance_learns_from_comes_back(situation, tmp_path):
-    gains = np.random.default_rng(0).normal(size=(COUNT, 2)).astype(np.float32)
-    stored.save_glance(tmp_path / "one.npz", situation, gains, 7)
-    again, told, seed = stored.load_glance(tmp_path / "one.npz")
-    assert (dict(again.foreseen), seed) == ({}, 7)
-    np.testing.assert_array_equal(told, gains)
-    np.testing.assert_allclose(features(again)[1], features(situation.heard([]))[1], atol=0.02)
-
-
 def test_of_some_candidates_only_those_are_told(situation):
     chosen = np.arange(COUNT) % 3 == 0
+    situation = replace(situation, glanced=np.arange(2.0 * COUNT, dtype="f4").reshape(COUNT, 2))
     np.testing.assert_allclose(features(situation.among(chosen))[1], features(situation)[1][chosen], atol=1e-6)
 
 
@@ -194,37 +140,32 @@ def test_what_can_be_learnt_is_known_of_unseen_garments(tmp_path):
         assert found.gain > 0.9 * best.gain
 
 
-def test_a_glance_that_knows_the_gains_misses_none():
+def test_few_that_are_best_bring_most():
     data = lessons(20)
-    knows, guesses = glanced(data, data.gains), glanced(data, np.zeros_like(data.gains))
-    for task in ("flatten", "canonicalize"):
-        assert knows[task]["of those a glance likes"] == knows[task]["of the best"]
-        assert guesses[task]["of those a glance likes"] < knows[task]["of the best"]
+    gains = data.gains[:, 0]
+    assert best_few(gains, gains, data.state) > best_few(np.zeros_like(gains), gains, data.state)
+    assert best_few(gains, gains, data.state) == pytest.approx(gains.reshape(20, 10).max(axis=1).mean(), abs=1e-5)
 
 
-def test_both_kinds_of_judges_are_taught_from_what_was_collected(situation, tmp_path):
+def test_a_judge_is_taught_from_what_was_collected(situation, tmp_path):
     few = options(tmp_path, epochs=1, folds=0)
     with pytest.raises(SystemExit, match=r"medor_planner\.judge\.collect"):
         train(few)
-    (tmp_path / stored.GLANCES).mkdir()
-    stored.save_glance(tmp_path / stored.GLANCES / "one.npz", situation, np.zeros((COUNT, 2)), 7)
-    train(few)
-    assert {folder.name for folder in few.out.iterdir()} == {GLANCE}
     outcomes = Outcomes(np.arange(13.0), np.arange(13.0) / 100, np.ones(13), 0.05, 7)
     (tmp_path / stored.DECISIONS).mkdir()
     stored.save(tmp_path / stored.DECISIONS / "one.npz", situation, outcomes)
     train(few)
-    for name in JUDGES:
-        assert np.isfinite(Judge.load(name, few.out).gains(situation)).all()
+    glanced = replace(situation, glanced=Glance.load().gains(situation))
+    assert np.isfinite(Judge.load(few.out).gains(glanced)).all()
 
 
 def test_what_was_taught_is_what_plans_use(tmp_path):
     data, taught_so = lessons(20), options(tmp_path)
     ensemble = taught(data.values, data.gains, taught_so)
-    write(ensemble, ALL, data, {}, taught_so)
+    write(ensemble, data, {}, taught_so)
     with torch.no_grad():
         expected = ensemble(torch.from_numpy(data.values)).numpy()
-    judge = Judge.load(ALL, tmp_path / "judge")
+    judge = Judge.load(tmp_path / "judge")
     assert judge.names == data.names
     np.testing.assert_allclose(judge.expected(data.values), expected, atol=1e-6)
 
@@ -234,9 +175,9 @@ def test_a_judge_goes_on_from_what_another_learnt(tmp_path):
     many, few = lessons(60), lessons(13)
     new = replace(few, gains=few.gains + np.array([0.05, 0], np.float32))
     first = options(tmp_path)
-    write(taught(many.values, many.gains, first), ALL, many, {}, first)
+    write(taught(many.values, many.gains, first), many, {}, first)
     hurried = options(tmp_path, start=first.out, lr=1e-3, epochs=100)
-    before, history = earlier(ALL, new, hurried)
+    before, history = earlier(new, hurried)
     assert before is not None
     assert history["data"]["states"] == 60
     on, anew = (said(taught(new.values, new.gains, hurried, start), new.values) for start in (before, None))
@@ -247,27 +188,26 @@ def test_a_judge_goes_on_from_what_another_learnt(tmp_path):
 
 def test_a_judge_does_not_go_on_from_one_of_other_features(tmp_path):
     data, taught_so = lessons(20), options(tmp_path, epochs=1)
-    write(taught(data.values, data.gains, taught_so), ALL, data, {}, taught_so)
+    write(taught(data.values, data.gains, taught_so), data, {}, taught_so)
     with pytest.raises(SystemExit, match="other features"):
-        earlier(ALL, replace(data, names=tuple("abcdef")), options(tmp_path, start=taught_so.out))
+        earlier(replace(data, names=tuple("abcdef")), options(tmp_path, start=taught_so.out))
 
 
 def test_a_judge_that_knows_other_features_does_not_decide(tmp_path, situation):
     data, taught_so = lessons(20), options(tmp_path, epochs=1)
-    write(taught(data.values, data.gains, taught_so), ALL, data, {}, taught_so)
+    write(taught(data.values, data.gains, taught_so), data, {}, taught_so)
     with pytest.raises(BadRequest, match="other features"):
-        Judge.load(ALL, tmp_path / "judge").rated(situation, "flatten")
+        Judge.load(tmp_path / "judge").rated(situation, "flatten")
 
 
 def test_without_weights_the_command_that_makes_them_is_named(tmp_path):
     with pytest.raises(BadRequest, match=r"medor_planner\.judge\.train"):
-        Judge.load(ALL, tmp_path)
+        Judge.load(tmp_path)
 
 
-@pytest.mark.parametrize("name", JUDGES)
 @pytest.mark.parametrize("task", ["flatten", "canonicalize"])
-def test_the_shipped_judges_rate_in_the_units_of_the_task(situation, task, name):
-    rewards, now = Judge.load(name).rated(situation, task)
+def test_the_shipped_judge_rates_in_the_units_of_the_task(situation, task):
+    rewards, now = Judge.load().rated(replace(situation, glanced=Glance.load().gains(situation)), task)
     assert rewards.shape == (COUNT,)
     if task == "flatten":
         assert now == pytest.approx(Relief.of(situation.view, situation.camera).area_m2)
@@ -297,20 +237,21 @@ def test_what_is_collected_can_be_learnt_from(full_lab, tmp_path, judge):
     assert (len(drawn.candidates), len(outcomes.coverage_m2)) == (3, 4)
     assert 0 < outcomes.coverage_m2[0] < outcomes.flat_coverage_m2
     Garment(full_lab.bus, replace(few, glances=True), "tshirt", 600_900).collect()
-    glance, gains, seed = stored.load_glance(tmp_path / stored.GLANCES / "tshirt-600900-0.npz")
-    assert (dict(glance.foreseen), len(gains), seed) == ({}, 12, 600_900)
+    glanced, outcomes = stored.load(tmp_path / stored.GLANCES / "tshirt-600900-0.npz")
+    assert (dict(glanced.foreseen), len(outcomes.cost_m), outcomes.seed) == ({}, 4, 600_900)
 
 
 class LikesLongPulls:
-    """A judge that knows only how far pulls go."""
+    """A glance that knows only how far pulls go."""
 
-    def rated(self, situation: Situation, task: str) -> tuple[np.ndarray, float]:
-        return np.linalg.norm(situation.candidates.places - situation.candidates.picks, axis=1), 0.0
+    def gains(self, situation: Situation) -> np.ndarray:
+        length = np.linalg.norm(situation.candidates.places - situation.candidates.picks, axis=1)
+        return np.stack([length, length], axis=1)
 
 
-def test_what_a_glance_likes_best_of_many_pulls_is_rolled_out(full_lab):
-    judges: dict[str, Any] = {ALL: Judge.load(ALL), GLANCE: LikesLongPulls()}
-    planner = Planner(full_lab.bus, Plans(), judge=judges.__getitem__, glances=20)
+def test_what_a_glance_likes_best_of_many_pulls_is_rolled_out(full_lab, monkeypatch):
+    monkeypatch.setattr(Glance, "load", lambda folder: LikesLongPulls())
+    planner = Planner(full_lab.bus, Plans(), glances=20)
     plan = planner.plan(
         PlanRequest(category="tshirt", method="medor+judge", candidates=10, exhaustive=True, seed=3), Call()
     )

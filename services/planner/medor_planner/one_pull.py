@@ -24,7 +24,6 @@ from scipy.stats import rankdata
 from medor_planner.choice import no_op
 from medor_planner.goals import Goals
 from medor_planner.judge.hearing import Hearing
-from medor_planner.judge.judge import Judge
 from medor_planner.methods import METHODS, Method
 from medor_planner.sampling import Candidates, Scene
 from medor_planner.shooting import Shooting
@@ -188,7 +187,7 @@ def rated(bus: Bus, method: Method, category: Category, task: Task, candidates: 
         asked = PlanRequest(
             category=category, task=task, method=method.name, candidates=len(candidates), exhaustive=True
         )
-        hearing, stages = Hearing(bus, Goals(bus), Judge.load), Stages(Call(), lambda progress: None)
+        hearing, stages = Hearing(bus, Goals(bus)), Stages(Call(), lambda progress: None)
         choice = hearing.choice(asked, Scene(mesh, view), candidates, stages, cancel)
         return np.r_[choice.no_op_reward or 0.0, choice.rewards]
     reward = Reward(task=task, visible_only=method.visible_reward)

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from medor_planner.choice import Choice, no_op
 from medor_planner.goals import Goals
 from medor_planner.judge.hearing import Hearing
-from medor_planner.judge.judge import Judge
+from medor_planner.judge.judge import SHIPPED
 from medor_planner.methods import Method, method_named
 from medor_planner.plans import Plans
 from medor_planner.random_policy import random_action
@@ -48,7 +49,7 @@ class Planner:
         plans: Plans,
         chunk: int = CHUNK,
         screening: Screening | None = None,
-        judge: Callable[[str], Judge] = Judge.load,
+        judges: Path = SHIPPED,
         glances: int = GLANCES,
     ) -> None:
         self._bus = bus
@@ -56,7 +57,7 @@ class Planner:
         self._goals = Goals(bus)
         self._chunk, self._glances = chunk, glances
         self._screening = screening or Screening()
-        self._hearing = Hearing(bus, self._goals, judge, chunk)
+        self._hearing = Hearing(bus, self._goals, judges, chunk)
 
     def plan(self, request: PlanRequest, call: Call) -> Plan:
         """The best of `request.candidates` sampled actions, or doing nothing when that is predicted best.

@@ -65,6 +65,6 @@ class Screening:
             log.warning("plans without screening, every candidate is rolled out: %s", reason)
 
 
-def best(rated: NDArray[np.float64], count: int) -> NDArray[np.bool_]:
+def best(rated: NDArray, count: int) -> NDArray[np.bool_]:
     """(K,) so many of K rated candidates that are rated best."""
     return np.isin(np.arange(len(rated)), np.argsort(-rated, kind="stable")[:count])

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from medor_planner.episode import Episodes
 from medor_planner.executor import Executor
-from medor_planner.judge.judge import SHIPPED, Judge
+from medor_planner.judge.judge import SHIPPED
 from medor_planner.planner import GLANCES, Planner
 from medor_planner.plans import Plans
 from medor_planner.screening import BACKEND, KEEP, Screening
@@ -32,7 +32,7 @@ class Config(Settings, section="planner"):
     glances: int = Field(default=GLANCES, ge=1)
     """Pulls that a judge glances at for every candidate that is asked for."""
     judge: Path = SHIPPED
-    """Folder of the judges' weights, as `python -m medor_planner.judge.train` leaves it."""
+    """Folder of the weights of the glance and of the judge."""
 
 
 def main(config: Config) -> None:
@@ -43,7 +43,7 @@ def main(config: Config) -> None:
             plans,
             config.chunk,
             Screening(config.screen, config.keep),
-            lambda name: Judge.load(name, config.judge),
+            config.judge,
             config.glances,
         )
         executor = Executor(bus, plans)

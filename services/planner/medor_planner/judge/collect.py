@@ -5,17 +5,15 @@ candidates would do, those that the last glance likes and some others, on the me
 view, and the cloth solver rolls the same candidates out on the true garment. Then one of them is carried out: what the
 last judge likes best, the truly best one, or any. So a judge learns from where the one before it leads.
 
-A glance learns to say at once what the last judge says of candidates when it has heard the rough model: `--glances`
-collects that instead, several times as fast, when the other judges are taught. One file a state in `decisions` or
-`glances`; kill it and start it again: it goes on.
+A glance learns from what pulls truly bring, too, but hears no model: `--glances` collects that instead, more pulls a
+minute. One file a state in `decisions` or `glances`; kill it and start it again: it goes on.
 """
 
 import sys
 import threading
 import uuid
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +25,10 @@ from medor_cloth.alignment import canonical_cost
 from medor_cloth.coverage import coverages
 from medor_planner.executor import Executor
 from medor_planner.goals import Goals, canonical_of
-from medor_planner.judge.judge import ALL, GLANCE, SCREEN, SHIPPED, TASKS, Judge
+from medor_planner.judge.glance import Glance
+from medor_planner.judge.judge import SHIPPED, TASKS, Judge
 from medor_planner.judge.opinions import COARSE, OPINIONS, Opinion, consulted, reconstructed
-from medor_planner.judge.situation import DECISIONS, GLANCES, Outcomes, Situation, save, save_glance
+from medor_planner.judge.situation import DECISIONS, GLANCES, Outcomes, Situation, save
 from medor_planner.plans import Plans
 from medor_planner.sampling import Scene, sample
 from medor_planner.screening import SCREEN_CHUNK, best
@@ -78,7 +77,7 @@ class Options:
     others: int = 10
     """Of the rest, taken at random."""
     glances: bool = False
-    """What the last judge says of all of them, who has heard the rough model; nothing of what truly comes."""
+    """No model is heard: lessons for a glance."""
     judge: Path | None = SHIPPED
     """Folder of the last judge's weights; `None`: there is none that knows today's features, models are trusted."""
 
@@ -121,12 +120,12 @@ class Garment:
         self._task: Task = TASKS[int(self._rng.integers(len(TASKS)))]
         self._executor = Executor(bus, Plans())
         self._never = threading.Event()
+        self._folder = GLANCES if options.glances else DECISIONS
 
     def collect(self) -> None:
         """Write the states that are not there yet. Raises what the cell's services do."""
         names = [f"{self._category}-{self._seed}-{k}.npz" for k in range(self._options.pulls)]
-        last = GLANCES if self._options.glances else DECISIONS
-        if all((self._options.out / last / name).exists() for name in names):
+        if all((self._options.out / self._folder / name).exists() for name in names):
             return
         self._bus.ask(endpoints.RESET, ResetRequest(category=self._category, garment_seed=self._seed, seed=self._seed))
         with self._executor.hold() as robot:
@@ -136,23 +135,22 @@ class Garment:
     def _decided(self, epoch: int, name: str) -> ActRequest:
         """Write what there is to be learnt from the garment as it lies; one of the candidates to carry out."""
         view = self._bus.ask(endpoints.CAPTURE, Empty())
-        asked = OPINIONS[:1] if self._options.glances else OPINIONS
-        meshes = reconstructed(self._bus, view, self._category, [opinion.recon for opinion in asked], self._never)
+        heard: Sequence[Opinion] = () if self._options.glances else OPINIONS
+        recons = [opinion.recon for opinion in heard or OPINIONS[:1]]
+        meshes = reconstructed(self._bus, view, self._category, recons, self._never)
         mesh = meshes[OPINIONS[0].recon]
         candidates = sample(Scene(mesh, view), self._options.drawn, self._rng, reachable=self._reachable)
         goals = self._goals.of(canonical_of(mesh), self._never)
         drawn = Situation(view, mesh, candidates, goals, {})
-        roughly, truth = partial(self._hearing, [COARSE], meshes, chunk=SCREEN_CHUNK), None
-        if self._options.glances:
-            drawn = roughly(drawn)
-            gains = self._gains(drawn, SCREEN)
-            save_glance(self._options.out / GLANCES / name, drawn, gains, self._seed)
-        else:
-            drawn = drawn.among(self._some(self._gains(drawn if self._options.judge else roughly(drawn), GLANCE)))
-            drawn = self._hearing(OPINIONS, meshes, drawn)
-            outcomes = self._outcomes(drawn)
-            save(self._options.out / DECISIONS / name, drawn, outcomes)
-            gains, truth = self._gains(drawn, ALL), np.stack([outcomes.coverage_m2, -outcomes.cost_m], axis=1)[1:]
+        glanced = self._glanced(drawn, meshes)
+        some = self._some(glanced)
+        glanced, drawn = glanced[some], replace(drawn, glanced=glanced).among(some)
+        drawn = self._hearing(heard, meshes, drawn)
+        outcomes = self._outcomes(drawn)
+        save(self._options.out / self._folder / name, drawn, outcomes)
+        judged = heard and self._options.judge
+        gains = Judge.load(judged).gains(drawn) if judged else glanced
+        truth = np.stack([outcomes.coverage_m2, -outcomes.cost_m], axis=1)[1:]
         chosen = self._chosen(gains, truth)
         return ActRequest(
             action_id=f"{name}-{uuid.uuid4().hex}",
@@ -176,14 +174,14 @@ class Garment:
         chosen[self._rng.permutation(np.flatnonzero(~chosen))[: self._options.others]] = True
         return chosen
 
-    def _gains(self, situation: Situation, judge: str) -> NDArray:
-        """(K, 2) what to expect of candidates: what the last judge says or, without one, the rough model."""
+    def _glanced(self, situation: Situation, meshes: Mapping[str, ClothMesh]) -> NDArray[np.float32]:
+        """(K, 2) what to expect of candidates: what a glance says or, without one, the rough model."""
         if self._options.judge:
-            return Judge.load(judge, self._options.judge).gains(situation)
-        first, goals = situation.foreseen[COARSE.name], situation.goals
+            return Glance.load(self._options.judge).gains(situation)
+        first, goals = self._hearing([COARSE], meshes, situation, SCREEN_CHUNK).foreseen[COARSE.name], situation.goals
         covered = coverages(first.positions, first.mesh.faces, threads=1) / goals.flat_coverage_m2
         cost = canonical_cost(first.positions, goals.goals)
-        return np.stack([covered[1:] - covered[0], cost[0] - cost[1:]], axis=1)
+        return np.stack([covered[1:] - covered[0], cost[0] - cost[1:]], axis=1).astype(np.float32)
 
     def _outcomes(self, situation: Situation) -> Outcomes:
         """What the candidates do to the true garment."""

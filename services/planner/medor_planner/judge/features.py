@@ -3,7 +3,7 @@
 None depends on where on the table the garment lies or which way it is turned.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from medor_cloth.coverage import coverages
 from medor_planner.judge.relief import CELL_M, Relief
 from medor_planner.judge.situation import Foreseen, Situation
 from medor_planner.sampling import ABOVE
-from medor_wire.messages import Category, ClothMesh
+from medor_wire.messages import Category, ClothMesh, GoalSet
 
 CATEGORIES: tuple[Category, ...] = ("trousers", "tshirt", "dress", "skirt", "jumpsuit")
 ALONG_M = (-0.12, -0.09, -0.06, -0.03, 0.03, 0.06, 0.09, 0.12, 0.16)
@@ -54,6 +54,8 @@ def _parts(situation: Situation, relief: Relief) -> Iterator[Columns]:
     yield _pull(situation, relief, picks, places, heading)
     yield _on_the_way(relief, picks, heading)
     yield _in_the_mesh(situation, picks, places, heading)
+    if situation.glanced is not None:
+        yield {"glance gain": situation.glanced[:, 0], "glance nearer": situation.glanced[:, 1]}
     for name, one in situation.foreseen.items():
         yield {f"{name} {key}": column for key, column in _foreseen(situation, relief, one).items()}
 
@@ -109,12 +111,11 @@ def _on_the_way(relief: Relief, picks: NDArray, heading: NDArray) -> Columns:
 def _in_the_mesh(situation: Situation, picks: NDArray, places: NDArray, heading: NDArray) -> Columns:
     """What is believed of the picked vertex: layers, place in the garment, and the way it would have to go."""
     mesh, goals = situation.mesh, situation.goals
-    vertices, canonical = mesh.vertices.astype(np.float64), _canonical(mesh)
+    vertices, canonical, place = mesh.vertices.astype(np.float64), _canonical(mesh), worn(mesh)
     picked = KDTree(vertices).query(picks - ABOVE)[1]
     layers = KDTree(vertices[:, :2]).query_ball_point(vertices[picked, :2], AROUND_M, return_length=True)
     of_one = len(vertices) / (2 * goals.flat_coverage_m2) * np.pi * AROUND_M**2
-    worn, size = canonical - canonical.mean(axis=0), np.maximum(np.ptp(canonical, axis=0), 1e-6)
-    way = _to_goal(vertices, goals.goals.astype(np.float64))
+    way = ways(mesh, goals)
     patch = KDTree(canonical).query(canonical[picked], k=min(PATCH, len(canonical)))[1]
     left, together = way[picked], way[patch].mean(axis=1)
     done = np.zeros_like(left)
@@ -123,9 +124,9 @@ def _in_the_mesh(situation: Situation, picks: NDArray, places: NDArray, heading:
     return {
         "confidence": _confidence(mesh)[picked],
         "layers": layers / of_one,
-        "worn_height": worn[picked, 2] / size[2],
-        "worn_side": np.abs(worn[picked, 0]) / size[0],
-        "worn_radius": np.linalg.norm(worn[picked], axis=1),
+        "worn_height": place[picked, 2],
+        "worn_side": np.abs(place[picked, 0]),
+        "worn_radius": np.linalg.norm(canonical[picked] - canonical.mean(axis=0), axis=1),
         "patch_spread": vertices[patch].std(axis=1).sum(axis=1),
         "goal_distance": np.linalg.norm(left, axis=1),
         "goal_along": along,
@@ -158,10 +159,18 @@ def _foreseen(situation: Situation, relief: Relief, one: Foreseen) -> Columns:
     }
 
 
-def _to_goal(vertices: NDArray[np.float64], goals: NDArray[np.float64]) -> NDArray[np.float64]:
+def ways(mesh: ClothMesh, goals: GoalSet) -> NDArray[np.float64]:
     """(V, 3) from each vertex to its place in the nearest goal, brought to the garment in the plane [m]."""
-    ways = [moved_in_plane(goal, *align_in_plane(goal, vertices)) - vertices for goal in goals]
-    return min(ways, key=lambda way: float(np.linalg.norm(way, axis=1).mean()))
+    vertices = mesh.vertices.astype(np.float64)
+    poses = goals.goals.astype(np.float64)
+    found = [moved_in_plane(pose, *align_in_plane(pose, vertices)) - vertices for pose in poses]
+    return min(found, key=lambda way: float(np.linalg.norm(way, axis=1).mean()))
+
+
+def worn(mesh: ClothMesh) -> NDArray[np.float64]:
+    """(V, 3) places in the garment as it is worn, from its middle, over its extent along each axis."""
+    canonical = _canonical(mesh)
+    return (canonical - canonical.mean(axis=0)) / np.maximum(np.ptp(canonical, axis=0), 1e-6)
 
 
 def _canonical(mesh: ClothMesh) -> NDArray[np.float64]:
@@ -170,3 +179,9 @@ def _canonical(mesh: ClothMesh) -> NDArray[np.float64]:
 
 def _confidence(mesh: ClothMesh) -> NDArray[np.float32]:
     return np.ones(len(mesh.vertices), np.float32) if mesh.confidence is None else mesh.confidence
+
+
+def mirrored(names: Sequence[str]) -> NDArray[np.int64]:
+    """(F,) which feature takes the place of which when pulls are seen in a mirror along them."""
+    aside = {f"height_{1e3 * at:.0f}_{1e3 * by:.0f}": f"height_{1e3 * at:.0f}_{-1e3 * by:.0f}" for at, by in ASIDE_M}
+    return np.array([names.index(aside.get(name, name)) for name in names])

@@ -1,12 +1,14 @@
 """A judged decision: a glance at many pulls, and all models' word on those that it likes best."""
 
 import threading
-from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
+from pathlib import Path
 
 from medor_planner.choice import Choice
 from medor_planner.goals import Goals, canonical_of
-from medor_planner.judge.judge import ALL, GLANCE, Judge
+from medor_planner.judge.glance import Glance
+from medor_planner.judge.judge import SHIPPED, TASKS, Judge
 from medor_planner.judge.opinions import OPINIONS, consulted, reconstructed
 from medor_planner.judge.situation import Situation
 from medor_planner.sampling import Candidates, Scene
@@ -23,7 +25,7 @@ class Hearing:
     Args:
         bus: where models are asked.
         goals: keeps goal poses.
-        judge: loads one of the judges by name.
+        weights: folder of the glance's and the judge's.
         chunk: candidates per request.
     """
 
@@ -31,11 +33,11 @@ class Hearing:
         self,
         bus: Bus,
         goals: Goals,
-        judge: Callable[[str], Judge],
+        weights: Path = SHIPPED,
         chunk: int = CHUNK,
     ) -> None:
         self._bus, self._goals, self._chunk = bus, goals, chunk
-        self._judge = cache(judge)
+        self._glance, self._judge = cache(lambda: Glance.load(weights)), cache(lambda: Judge.load(weights))
 
     def choice(
         self, request: PlanRequest, scene: Scene, drawn: Candidates, stages: Stages, cancel: threading.Event
@@ -62,13 +64,13 @@ class Hearing:
 
         count = request.candidates if request.exhaustive else min(request.candidates, AT_LEAST)
         case = Situation(scene.view, scene.mesh, drawn, goals, {})
-        if len(drawn) > count:
-            with stages.stage("screen"):
-                rewards, _ = self._judge(GLANCE).rated(case, request.task)
-            case = case.among(best(rewards, count))
+        with stages.stage("screen"):
+            gains = self._glance().gains(case)
+            chosen = best(gains[:, TASKS.index(request.task)], min(count, len(drawn)))
+            case = replace(case, glanced=gains).among(chosen)
         with stages.stage("rollout"):
             tell = partial(stages.report, "rollout")
             case = case.hearing(consulted(self._bus, OPINIONS, meshes, case.candidates, cancel, tell, self._chunk))
         with stages.stage("judge"):
-            rewards, no_op_reward = self._judge(ALL).rated(case, request.task)
+            rewards, no_op_reward = self._judge().rated(case, request.task)
         return Choice(case.candidates, rewards, no_op_reward, len(drawn))

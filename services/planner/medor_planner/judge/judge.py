@@ -15,7 +15,6 @@ from safetensors.numpy import load_file
 
 from medor_cloth.alignment import canonical_cost
 from medor_planner.judge.features import features
-from medor_planner.judge.opinions import COARSE, OPINIONS
 from medor_planner.judge.relief import Relief
 from medor_planner.judge.situation import Situation
 from medor_wire.errors import BadRequest
@@ -23,10 +22,8 @@ from medor_wire.messages import Task
 
 SHIPPED = Path(__file__).parent / "weights"
 WEIGHTS, CONFIG = "weights.safetensors", "config.json"
-ALL, SCREEN, GLANCE = "all", "screen", "glance"
-JUDGES = {ALL: tuple(opinion.name for opinion in OPINIONS), SCREEN: (COARSE.name,), GLANCE: ()}
-"""Folders of weights, and whom each judge listens to: one decides; one hears the rough model and teaches the last, who
-hears none and says at a glance what is worth rolling out."""
+FOLDER = "all"
+"""Of the judge who hears a glance and all models, in the folder of weights."""
 TASKS: tuple[Task, ...] = ("flatten", "canonicalize")
 """Order of the networks' outputs."""
 LIMIT = 4.0
@@ -53,19 +50,19 @@ class Judge:
     members: tuple[tuple[tuple[NDArray[np.float32], NDArray[np.float32]], ...], ...]
 
     @classmethod
-    def load(cls, name: str, root: Path = SHIPPED) -> Self:
-        """One of `JUDGES`, from the folder that training wrote.
+    def load(cls, root: Path = SHIPPED) -> Self:
+        """From the folder of weights.
 
         Raises:
             BadRequest: there are no weights in it.
         """
-        folder = root / name
+        folder = root / FOLDER
         try:
             config: dict[str, Any] = json.loads((folder / CONFIG).read_text())
             arrays = {name: array.astype(np.float32) for name, array in load_file(folder / WEIGHTS).items()}
         except (OSError, ValueError, SafetensorError) as error:
             raise BadRequest(
-                f"no weights of the judge in {root.name}/{name}/ ({error}); they are trained by "
+                f"no weights of the judge in {root.name}/{FOLDER}/ ({error}); they are trained by "
                 "`python -m medor_planner.judge.train --data <folder> --out <folder>`"
             ) from error
         members = tuple(

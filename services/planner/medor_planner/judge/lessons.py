@@ -1,8 +1,9 @@
 """What a judge is taught and examined with: all candidates of all states that were collected."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +11,12 @@ from rich.console import Console
 from rich.progress import track
 
 from medor_planner.judge.features import features
+from medor_planner.judge.glance import Glance
 from medor_planner.judge.opinions import OPINIONS
-from medor_planner.judge.situation import Outcomes, Situation, load
+from medor_planner.judge.situation import Outcomes, load
 
 LOST_M = 0.1
 """Canonical cost of a vertex that leaves the picture, on top of its own [m]."""
-
-Lesson = tuple[Situation, NDArray[np.float32], int]
-"""What is known of K candidates, their gains (K, 2) and the garment's seed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,30 +38,19 @@ class Lessons:
     garment: NDArray[np.int64]
 
     @classmethod
-    def read(cls, paths: Sequence[Path], lesson: Callable[[Path], Lesson]) -> "Lessons":
-        """All states that were collected."""
+    def read(cls, paths: Sequence[Path], glance: Glance) -> Self:
+        """All states that were collected, at each of which a glance says its word."""
         names: tuple[str, ...] = ()
         rows, gains, garment = [], [], []
         for path in track(paths, "features", console=Console(stderr=True), transient=True):
-            situation, gain, seed = lesson(path)
-            names, values = features(situation)
+            situation, outcomes = load(path)
+            situation = situation.heard(opinion.name for opinion in OPINIONS)
+            names, values = features(replace(situation, glanced=glance.gains(situation)))
             rows.append(values)
-            gains.append(gain)
-            garment.append(np.full(len(values), seed))
+            gains.append(gained(outcomes))
+            garment.append(np.full(len(values), outcomes.seed))
         state = np.repeat(np.arange(len(rows)), [len(values) for values in rows])
         return cls(names, np.concatenate(rows), np.concatenate(gains), state, np.concatenate(garment))
-
-    def told(self, opinions: Sequence[str]) -> "Lessons":
-        """The same, when only some opinions are known."""
-        silent = tuple(f"{opinion.name} " for opinion in OPINIONS if opinion.name not in opinions)
-        kept = [i for i, name in enumerate(self.names) if not name.startswith(silent)] if silent else slice(None)
-        return replace(self, names=tuple(np.array(self.names)[kept].tolist()), values=self.values[:, kept])
-
-
-def outcome(path: Path) -> Lesson:
-    """A decision of which all models were heard, and what truly came."""
-    situation, outcomes = load(path)
-    return situation.heard(opinion.name for opinion in OPINIONS), gained(outcomes), outcomes.seed
 
 
 def gained(outcomes: Outcomes) -> NDArray[np.float32]:

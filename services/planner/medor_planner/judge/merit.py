@@ -11,8 +11,8 @@ from medor_planner.judge.judge import TASKS
 from medor_planner.judge.lessons import Lessons
 from medor_planner.judge.opinions import OPINIONS
 
-FEW = 25
-"""A glance leaves one candidate in so many to be rolled out: 20 of 500."""
+FEW = 8
+"""A glance is judged by the best one in so many of the candidates whose outcome is known."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,8 @@ def compared(data: Lessons, expected: dict[str, NDArray[np.float32]]) -> dict[st
     found: dict[str, dict[str, Merit]] = {}
     for column, (task, feature) in enumerate(zip(TASKS, ("gain", "nearer"), strict=True)):
         gains = data.gains[:, column]
-        ratings = {f"judge: {name}": gain[:, column] for name, gain in expected.items()}
+        ratings = {name: gain[:, column] for name, gain in expected.items()}
+        ratings["a glance"] = data.values[:, data.names.index(f"glance {feature}")]
         ratings |= {it.name: data.values[:, data.names.index(f"{it.name} {feature}")] for it in OPINIONS}
         ratings["the outcome itself"] = gains
         found[task] = {name: merit(rating, gains, data.state) for name, rating in ratings.items()}
@@ -65,16 +66,10 @@ def table(found: dict[str, dict[str, Merit]]) -> Table:
     return out
 
 
-def glanced(data: Lessons, ratings: NDArray[np.float32]) -> dict[str, dict[str, float]]:
-    """By task: mean gain (as the teacher says) of the few candidates of a state that are best, of those that ratings
-    (N, 2) like best, and of all; means over states."""
-    found = {}
-    for column, task in enumerate(TASKS):
-        means = []
-        for one in np.unique(data.state):
-            gains, rated = data.gains[data.state == one, column], ratings[data.state == one, column]
-            few = -(-len(gains) // FEW)
-            means.append([np.sort(gains)[-few:].mean(), gains[np.argsort(-rated)[:few]].mean(), gains.mean()])
-        keys = ("of the best", "of those a glance likes", "of all")
-        found[task] = dict(zip(keys, np.array(means, np.float64).mean(axis=0).round(5).tolist(), strict=True))
-    return found
+def best_few(ratings: NDArray, gains: NDArray, state: NDArray[np.int64]) -> float:
+    """What the few of a state's candidates that ratings like best bring on average, mean over states."""
+    means = []
+    for one in np.unique(state):
+        rated, brought = ratings[state == one], gains[state == one]
+        means.append(brought[np.argsort(-rated)[: max(len(rated) // FEW, 1)]].mean())
+    return round(float(np.mean(means)), 5)

@@ -72,10 +72,11 @@ class Relief:
         return np.asarray(distance_transform_edt(self.heights == 0, sampling=CELL_M))
 
     def at(self, values: NDArray, xy: NDArray) -> NDArray:
-        """(...) values of the cells at points (..., 2) [m]; beyond the grid those of its edge."""
-        cells = ((np.asarray(xy) - self.corner) // CELL_M).astype(np.int64)
-        rows, columns = values.shape
-        return values[np.clip(cells[..., 1], 0, rows - 1), np.clip(cells[..., 0], 0, columns - 1)]
+        """(..., *C) values (R, C, *C) of the cells at points (..., 2) [m]; beyond the grid those of its edge."""
+        cells = ((np.asarray(xy) - self.corner) * (1 / CELL_M)).astype(np.int32)
+        rows, columns = values.shape[:2]
+        at = np.clip(cells[..., 1], 0, rows - 1) * columns + np.clip(cells[..., 0], 0, columns - 1)
+        return values.reshape(rows * columns, *values.shape[2:]).take(at, axis=0)
 
 
 def _rim(cloth: NDArray[np.bool_], camera: Camera, depth: float) -> float:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self, cast
+from typing import Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,7 @@ class Situation:
         candidates: K of them.
         goals: of the mesh's canonical pose; all meshes share it.
         foreseen: by the name of the opinion.
+        glanced: (K, 2) what a glance expects: share of the flat coverage, metres of canonical cost; None before it.
     """
 
     view: DepthView
@@ -46,12 +47,14 @@ class Situation:
     candidates: Candidates
     goals: GoalSet
     foreseen: Mapping[str, Foreseen]
+    glanced: NDArray[np.float32] | None = None
 
     def among(self, chosen: NDArray[np.bool_]) -> Self:
         """The same decision among some of the candidates (K,)."""
         kept = np.concatenate([[True], chosen])
         foreseen = {name: Foreseen(one.mesh, one.positions[kept]) for name, one in self.foreseen.items()}
-        return replace(self, candidates=self.candidates.where(chosen), foreseen=foreseen)
+        glanced = None if self.glanced is None else self.glanced[chosen]
+        return replace(self, candidates=self.candidates.where(chosen), foreseen=foreseen, glanced=glanced)
 
     def hearing(self, more: Mapping[str, Foreseen]) -> Self:
         """The same decision, when more opinions are known."""
@@ -137,37 +140,17 @@ DECISIONS, GLANCES = "decisions", "glances"
 
 
 def save(path: Path, situation: Situation, outcomes: Outcomes) -> None:
-    """Write both to one file, at once."""
-    _write(path, situation.arrays() | {f"true_{k}": v for k, v in vars(outcomes).items()})
+    """Write both to one file, at once; not what a glance said, which another will say otherwise."""
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        np.savez_compressed(file, **situation.arrays(), **{f"true_{k}": v for k, v in vars(outcomes).items()})
+    part.replace(path)
 
 
 def load(path: Path) -> tuple[Situation, Outcomes]:
     """What `save` wrote."""
-    arrays = _read(path)
+    with np.load(path) as file:
+        arrays = dict(file)
     true = {name[5:]: arrays.pop(name) for name in list(arrays) if name.startswith("true_")}
     scalars = {"flat_coverage_m2": float(true.pop("flat_coverage_m2")), "seed": int(true.pop("seed"))}
     return Situation.restored(arrays), Outcomes(**true, **scalars)
-
-
-def save_glance(path: Path, situation: Situation, gains: NDArray, seed: int) -> None:
-    """Write what is known before any model is heard, and the gains (K, 2) that a judge expects who heard one."""
-    _write(path, situation.heard([]).arrays() | {"gains": gains.astype(np.float32), "seed": np.array(seed)})
-
-
-def load_glance(path: Path) -> tuple[Situation, NDArray[np.float32], int]:
-    """What `save_glance` wrote."""
-    arrays = _read(path)
-    gains, seed = arrays.pop("gains"), int(arrays.pop("seed"))
-    return Situation.restored(arrays), gains, seed
-
-
-def _write(path: Path, arrays: Mapping[str, Any]) -> None:
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
-        np.savez_compressed(file, **arrays)
-    part.replace(path)
-
-
-def _read(path: Path) -> dict[str, NDArray]:
-    with np.load(path) as file:
-        return dict(file)

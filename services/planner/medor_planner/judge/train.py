@@ -2,8 +2,8 @@
 
 A minute or two on one core. First every garment is judged by networks that have not seen it (cross-validation over
 garments): how well they rank, and what their favourite among a state's candidates brings, beside each model's
-favourite. Then networks are taught on all garments and written. A glance learns what the last judge said; how much is
-lost is told. Needs torch: `pip install medor-planner[train]`.
+favourite. Then networks are taught on all garments and written. What a glance says is among what they are told, so
+teach it first (`medor_planner.judge.train_glance`), on other garments.
 """
 
 import sys
@@ -23,13 +23,12 @@ from torch import Tensor, nn
 
 from medor_learn import weights
 from medor_learn.revision import revision
-from medor_planner.judge.judge import GLANCE, JUDGES, LIMIT, TASKS
-from medor_planner.judge.lessons import Lessons, outcome
-from medor_planner.judge.merit import compared, glanced, table
-from medor_planner.judge.situation import DECISIONS, GLANCES, load_glance
-
-UNIT = (0.05, 0.008)
-"""Typical gains: share of the flat coverage, metres of canonical cost."""
+from medor_planner.judge.glance import UNIT, Glance
+from medor_planner.judge.judge import FOLDER, LIMIT, SHIPPED, TASKS
+from medor_planner.judge.lessons import Lessons
+from medor_planner.judge.merit import compared, table
+from medor_planner.judge.opinions import OPINIONS
+from medor_planner.judge.situation import DECISIONS
 
 
 @dataclass(frozen=True)
@@ -39,6 +38,8 @@ class Options:
     data: Path
     """Folder that `medor_planner.judge.collect` filled."""
     out: Path
+    glance: Path = SHIPPED
+    """Folder of weights with the glance that the judge will hear."""
     members: int = 6
     """Networks that are averaged."""
     hidden: int = 64
@@ -53,7 +54,7 @@ class Options:
     """Of the cross-validation; 0: none."""
     seed: int = 0
     start: Path | None = None
-    """Folder of judges to go on from, with a smaller `--lr`; their merit is told beside the new ones'."""
+    """Folder of weights with a judge to go on from, with a smaller `--lr`; its merit is told beside the new one's."""
 
 
 class Ensemble(nn.Module):
@@ -118,7 +119,7 @@ def _teach(member: nn.Module, inputs: Tensor, targets: Tensor, options: Options)
             schedule.step()
 
 
-def earlier(name: str, data: Lessons, options: Options) -> tuple[Ensemble | None, dict[str, Any]]:
+def earlier(data: Lessons, options: Options) -> tuple[Ensemble | None, dict[str, Any]]:
     """The judge to go on from and how it came about.
 
     Raises:
@@ -127,10 +128,10 @@ def earlier(name: str, data: Lessons, options: Options) -> tuple[Ensemble | None
     """
     if options.start is None:
         return None, {}
-    ensemble, folder = Ensemble(len(data.names), options), options.start / name
-    history = weights.start(ensemble, folder)
+    ensemble, folder = Ensemble(len(data.names), options), options.start / FOLDER
     if tuple(weights.read_config(folder)["features"]) != data.names:
         raise SystemExit(f"{folder}: was taught with other features than the models give today")
+    history = weights.start(ensemble, folder)
     return ensemble.eval(), history
 
 
@@ -154,62 +155,35 @@ def judged_unseen(data: Lessons, options: Options, before: Ensemble | None = Non
 
 def main(options: Options) -> None:
     torch.set_num_threads(1)
-    decisions, glances = (sorted((options.data / folder).glob("*.npz")) for folder in (DECISIONS, GLANCES))
-    if not decisions and not glances:
+    paths = sorted((options.data / DECISIONS).glob("*.npz"))
+    if not paths:
         raise SystemExit(f"{options.data}: no states; collect some with `python -m medor_planner.judge.collect`")
-    if decisions:
-        teach_from_outcomes(Lessons.read(decisions, outcome), options)
-    if glances:
-        teach_a_glance(Lessons.read(glances, load_glance), options)
-
-
-def teach_from_outcomes(data: Lessons, options: Options) -> None:
-    """The judges that hear models."""
-    judges, metrics = {name: opinions for name, opinions in JUDGES.items() if opinions}, {}
+    data = Lessons.read(paths, Glance.load(options.glance))
+    before, history = earlier(data, options)
+    metrics = {}
     if options.folds:
-        expected = {}
-        for name, opinions in judges.items():
-            told = data.told(opinions)
-            before, _ = earlier(name, told, options)
-            expected[name] = judged_unseen(told, options, before)
-            if before is not None:
-                expected[f"{name} before"] = said(before, told.values)
+        expected = {"judge": judged_unseen(data, options, before)}
+        if before is not None:
+            expected["judge before"] = said(before, data.values)
         found = compared(data, expected)
         Console().print(table(found))
         metrics = {task: {name: asdict(one) for name, one in merits.items()} for task, merits in found.items()}
-    for name, opinions in judges.items():
-        teach(name, data.told(opinions), metrics, options)
-
-
-def teach_a_glance(data: Lessons, options: Options) -> None:
-    """The judge that hears none, of what one that did said."""
-    metrics = {}
-    if options.folds:
-        metrics = glanced(data, judged_unseen(data, options, earlier(GLANCE, data, options)[0]))
-        Console().print_json(data=metrics)
-    teach(GLANCE, data, metrics, options)
-
-
-def teach(name: str, data: Lessons, metrics: Mapping[str, Any], options: Options) -> None:
-    """One judge, on all there is."""
-    before, history = earlier(name, data, options)
-    write(taught(data.values, data.gains, options, before), name, data, metrics, options, history)
+    write(taught(data.values, data.gains, options, before), data, metrics, options, history)
     states, garments = data.state[-1] + 1, len(np.unique(data.garment))
-    sys.stdout.write(f"{options.out / name}: taught on {states} states of {garments} garments\n")
+    sys.stdout.write(f"{options.out / FOLDER}: taught on {states} states of {garments} garments\n")
 
 
 def write(
     ensemble: Ensemble,
-    name: str,
     data: Lessons,
     metrics: Mapping[str, Any],
     options: Options,
     history: Mapping[str, Any] | None = None,
 ) -> None:
     """A folder that `Judge.load` reads."""
-    schedule = {name: value for name, value in asdict(options).items() if name not in ("data", "out", "start")}
+    schedule = {name: value for name, value in asdict(options).items() if not isinstance(value, Path | None)}
     config = {
-        "opinions": list(JUDGES[name]),
+        "opinions": [opinion.name for opinion in OPINIONS],
         "features": list(data.names),
         "members": options.members,
         "layers": sorted({int(name.split(".")[2]) for name in ensemble.state_dict() if name.startswith("members.")}),
@@ -225,15 +199,15 @@ def write(
     }
     card = {
         "What it is": "Rates pick-and-place candidates: the gain in coverage and in closeness to the canonical pose to "
-        f"expect of each, from what the camera sees, what the mesh believes and what models foresee: "
-        f"{', '.join(JUDGES[name]) or 'none, it glances'}.",
+        f"expect of each, from what the camera sees, what the mesh believes, a glance, and what models foresee: "
+        f"{', '.join(opinion.name for opinion in OPINIONS)}.",
         "Data": config["data"],
         "Schedule": schedule,
         "Metrics": metrics,
         "Revision": str(config["revision"]),
         **({"It goes on from": history} if history else {}),
     }
-    weights.save(options.out / name, ensemble, config, card)
+    weights.save(options.out / FOLDER, ensemble, config, card)
 
 
 if __name__ == "__main__":
