@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from medor_planner.one_pull import Options, Records, Worth, wanted
+from medor_planner.one_pull import Options, Records, Worth, lay_out, wanted
 from medor_planner.sampling import Candidates
+from medor_wire import endpoints
+from medor_wire.messages import Empty
 
 GAINS = np.array([0.3, -0.2, 0.1, 0.0])
 PLACES = np.zeros((4, 3), np.float32)
@@ -42,3 +44,12 @@ def test_what_is_on_record_is_not_measured_again(tmp_path):
     done = {(it.method, it.category, it.task, it.state) for it in Records(tmp_path).found()}
     left = [(state, names) for _, _, state, names in wanted(options, done)]
     assert left == [(0, ["other"]), (1, ["some", "other"])]
+
+
+def test_garments_may_be_unfolded_before_the_pull_that_is_measured(full_lab):
+    bus = full_lab.bus
+    lay_out(bus, Options(), "tshirt", "flatten", 0)
+    as_dropped = bus.ask(endpoints.SCORE, Empty())
+    lay_out(bus, Options(unfolded=1), "tshirt", "flatten", 0)
+    assert bus.ask(endpoints.SCORE, Empty()).coverage_m2 != as_dropped.coverage_m2
+    assert bus.ask(endpoints.SCORE, Empty()).flat_coverage_m2 == as_dropped.flat_coverage_m2

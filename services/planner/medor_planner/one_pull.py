@@ -11,7 +11,7 @@ import sys
 import threading
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,7 @@ from medor_wire.messages import (
     ClothMesh,
     DepthView,
     Empty,
+    EpisodeRequest,
     PlanRequest,
     ReconstructRequest,
     ResetRequest,
@@ -68,6 +69,8 @@ class Options:
     states: int = 4
     """Garments with one crumple each, per category."""
     start: StartState = "drop"
+    unfolded: int = 0
+    """Pulls by the default method, for the task, before the one that is measured: late ones are harder to foresee."""
     candidates: int = 60
     out: Path = Path("runs/one-pull")
 
@@ -81,6 +84,7 @@ class Foresight:
         best: by the best candidate.
         chance: by a candidate drawn at random, on average.
         rank: Spearman correlation of its rewards with the true ones; 0 where either are all the same.
+        unfolded: pulls before this one.
     """
 
     method: str
@@ -91,6 +95,7 @@ class Foresight:
     best: float
     chance: float
     rank: float
+    unfolded: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +138,11 @@ class Records:
 
 def main(options: Options) -> None:
     console, records = Console(stderr=True), Records(options.out)
-    done = {(it.method, it.category, it.task, it.state) for it in records.found()}
+    done = {(it.method, it.category, it.task, it.state) for it in records.found() if it.unfolded == options.unfolded}
     with Launcher("sim", echo=False, logs=(options.out / "logs").absolute()) as cell:
         cell.wait_ready()
         for category, task, state, missing in wanted(options, done):
-            cell.bus.ask(endpoints.RESET, reset(options, category, state))
+            lay_out(cell.bus, options, category, task, state)
             worth = worth_of(cell.bus, options, category, task)
             for name in missing:
                 try:
@@ -145,10 +150,11 @@ def main(options: Options) -> None:
                 except MedorError as error:
                     console.print(f"{name}, {category} {state}: {error}", highlight=False)
                     continue
-                one = worth.judge(name, category, task, state, rewards)
+                one = replace(worth.judge(name, category, task, state, rewards), unfolded=options.unfolded)
                 records.append(one)
                 console.print(f"{category} {state} {task}  {name}  {one.gain:.2f} of {one.best:.2f}", highlight=False)
-    Console().print(table(it for it in records.found() if it.method in options.methods))
+    those = (it for it in records.found() if it.method in options.methods and it.unfolded == options.unfolded)
+    Console().print(table(those))
 
 
 def wanted(options: Options, done: set) -> Iterator[tuple[Category, Task, int, list[str]]]:
@@ -161,8 +167,16 @@ def wanted(options: Options, done: set) -> Iterator[tuple[Category, Task, int, l
                     yield category, task, state, missing
 
 
-def reset(options: Options, category: Category, state: int) -> ResetRequest:
-    return ResetRequest(category=category, garment_seed=HELD_OUT_SEED + state, state=options.start, seed=state)
+def lay_out(bus: Bus, options: Options, category: Category, task: Task, state: int) -> None:
+    """A garment as the measured pull will find it."""
+    reset = ResetRequest(category=category, garment_seed=HELD_OUT_SEED + state, state=options.start, seed=state)
+    if options.unfolded == 0:
+        bus.ask(endpoints.RESET, reset)
+        return
+    bus.ask(
+        endpoints.EPISODE,
+        EpisodeRequest(category=category, task=task, max_picks=options.unfolded, seed=state, reset=reset),
+    )
 
 
 def worth_of(bus: Bus, options: Options, category: Category, task: Task) -> Worth:
