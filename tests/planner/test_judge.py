@@ -14,7 +14,7 @@ from medor_planner.judge.collect import Garment
 from medor_planner.judge.collect import Options as CollectOptions
 from medor_planner.judge.features import features
 from medor_planner.judge.glance import Glance
-from medor_planner.judge.judge import SHIPPED, Judge
+from medor_planner.judge.judge import SHIPPED, Judge, rewards
 from medor_planner.judge.lessons import Lessons, gained
 from medor_planner.judge.merit import best_few, merit
 from medor_planner.judge.opinions import COARSE, OPINIONS
@@ -60,12 +60,9 @@ def test_features_do_not_depend_on_where_the_garment_lies_nor_how_it_is_turned(s
 def test_each_candidate_has_features_of_its_own(situation):
     order = np.random.default_rng(1).permutation(COUNT)
     some = situation.candidates
-    glanced = np.random.default_rng(2).normal(size=(COUNT, 2)).astype(np.float32)
-    situation = replace(situation, glanced=glanced)
     other = replace(
         situation,
         candidates=Candidates(some.picks[order], some.places[order]),
-        glanced=glanced[order],
         foreseen={
             name: replace(one, positions=one.positions[[0, *(order + 1)]]) for name, one in situation.foreseen.items()
         },
@@ -91,7 +88,6 @@ def test_what_is_stored_comes_back(situation, tmp_path):
 
 def test_of_some_candidates_only_those_are_told(situation):
     chosen = np.arange(COUNT) % 3 == 0
-    situation = replace(situation, glanced=np.arange(2.0 * COUNT, dtype="f4").reshape(COUNT, 2))
     np.testing.assert_allclose(features(situation.among(chosen))[1], features(situation)[1][chosen], atol=1e-6)
 
 
@@ -155,8 +151,7 @@ def test_a_judge_is_taught_from_what_was_collected(situation, tmp_path):
     (tmp_path / stored.DECISIONS).mkdir()
     stored.save(tmp_path / stored.DECISIONS / "one.npz", situation, outcomes)
     train(few)
-    glanced = replace(situation, glanced=Glance.load().gains(situation))
-    assert np.isfinite(Judge.load(few.out).gains(glanced)).all()
+    assert np.isfinite(Judge.load(few.out).gains(situation)).all()
 
 
 def test_what_was_taught_is_what_plans_use(tmp_path):
@@ -197,7 +192,7 @@ def test_a_judge_that_knows_other_features_does_not_decide(tmp_path, situation):
     data, taught_so = lessons(20), options(tmp_path, epochs=1)
     write(taught(data.values, data.gains, taught_so), data, {}, taught_so)
     with pytest.raises(BadRequest, match="other features"):
-        Judge.load(tmp_path / "judge").rated(situation, "flatten")
+        Judge.load(tmp_path / "judge").gains(situation)
 
 
 def test_without_weights_the_command_that_makes_them_is_named(tmp_path):
@@ -206,15 +201,16 @@ def test_without_weights_the_command_that_makes_them_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("task", ["flatten", "canonicalize"])
-def test_the_shipped_judge_rates_in_the_units_of_the_task(situation, task):
-    rewards, now = Judge.load().rated(replace(situation, glanced=Glance.load().gains(situation)), task)
-    assert rewards.shape == (COUNT,)
+@pytest.mark.parametrize("who", [Judge, Glance])
+def test_what_the_shipped_ones_expect_has_the_units_of_the_task(situation, task, who):
+    expected, now = rewards(situation, who.load().gains(situation), task)
+    assert expected.shape == (COUNT,)
     if task == "flatten":
         assert now == pytest.approx(Relief.of(situation.view, situation.camera).area_m2)
-        assert (np.abs(rewards - now) < situation.goals.flat_coverage_m2).all()
+        assert (np.abs(expected - now) < situation.goals.flat_coverage_m2).all()
     else:
         assert now == pytest.approx(-canonical_cost(situation.mesh.vertices, situation.goals.goals))
-        assert (np.abs(rewards - now) < 0.1).all()
+        assert (np.abs(expected - now) < 0.1).all()
 
 
 def test_a_judged_plan_hears_all_models_and_is_the_same_again(full_lab):

@@ -13,7 +13,7 @@ import sys
 import threading
 import uuid
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -144,12 +144,12 @@ class Garment:
         drawn = Situation(view, mesh, candidates, goals, {})
         glanced = self._glanced(drawn, meshes)
         some = self._some(glanced)
-        glanced, drawn = glanced[some], replace(drawn, glanced=glanced).among(some)
+        glanced, drawn = glanced[some], drawn.among(some)
         drawn = self._hearing(heard, meshes, drawn)
         outcomes = self._outcomes(drawn)
         save(self._options.out / self._folder / name, drawn, outcomes)
         judged = heard and self._options.judge
-        gains = Judge.load(judged).gains(drawn) if judged else glanced
+        gains = (glanced + Judge.load(judged).gains(drawn)) / 2 if judged else glanced
         truth = np.stack([outcomes.coverage_m2, -outcomes.cost_m], axis=1)[1:]
         chosen = self._chosen(gains, truth)
         return ActRequest(

@@ -54,8 +54,6 @@ def _parts(situation: Situation, relief: Relief) -> Iterator[Columns]:
     yield _pull(situation, relief, picks, places, heading)
     yield _on_the_way(relief, picks, heading)
     yield _in_the_mesh(situation, picks, places, heading)
-    if situation.glanced is not None:
-        yield {"glance gain": situation.glanced[:, 0], "glance nearer": situation.glanced[:, 1]}
     for name, one in situation.foreseen.items():
         yield {f"{name} {key}": column for key, column in _foreseen(situation, relief, one).items()}
 

@@ -1,14 +1,14 @@
-"""A judged decision: a glance at many pulls, and all models' word on those that it likes best."""
+"""A judged decision: a glance at many pulls, all models' word on those that it likes best, and the mean of what the
+glance and the judge who heard the models expect."""
 
 import threading
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
 from medor_planner.choice import Choice
 from medor_planner.goals import Goals, canonical_of
 from medor_planner.judge.glance import Glance
-from medor_planner.judge.judge import SHIPPED, TASKS, Judge
+from medor_planner.judge.judge import SHIPPED, TASKS, Judge, rewards
 from medor_planner.judge.opinions import OPINIONS, consulted, reconstructed
 from medor_planner.judge.situation import Situation
 from medor_planner.sampling import Candidates, Scene
@@ -65,12 +65,13 @@ class Hearing:
         count = request.candidates if request.exhaustive else min(request.candidates, AT_LEAST)
         case = Situation(scene.view, scene.mesh, drawn, goals, {})
         with stages.stage("screen"):
-            gains = self._glance().gains(case)
-            chosen = best(gains[:, TASKS.index(request.task)], min(count, len(drawn)))
-            case = replace(case, glanced=gains).among(chosen)
+            glanced = self._glance().gains(case)
+            chosen = best(glanced[:, TASKS.index(request.task)], min(count, len(drawn)))
+            glanced, case = glanced[chosen], case.among(chosen)
         with stages.stage("rollout"):
             tell = partial(stages.report, "rollout")
             case = case.hearing(consulted(self._bus, OPINIONS, meshes, case.candidates, cancel, tell, self._chunk))
         with stages.stage("judge"):
-            rewards, no_op_reward = self._judge().rated(case, request.task)
-        return Choice(case.candidates, rewards, no_op_reward, len(drawn))
+            gains = (glanced + self._judge().gains(case)) / 2
+            expected, no_op_reward = rewards(case, gains, request.task)
+        return Choice(case.candidates, expected, no_op_reward, len(drawn))

@@ -23,7 +23,7 @@ from medor_wire.messages import Task
 SHIPPED = Path(__file__).parent / "weights"
 WEIGHTS, CONFIG = "weights.safetensors", "config.json"
 FOLDER = "all"
-"""Of the judge who hears a glance and all models, in the folder of weights."""
+"""Of the judge who hears all models, in the folder of weights."""
 TASKS: tuple[Task, ...] = ("flatten", "canonicalize")
 """Order of the networks' outputs."""
 LIMIT = 4.0
@@ -81,24 +81,14 @@ class Judge:
             members,
         )
 
-    def rated(self, situation: Situation, task: Task) -> tuple[NDArray[np.float64], float]:
-        """Rewards to expect of the candidates (K,) and that of doing nothing: coverage [m²], or minus the canonical
-        cost [m].
+    def gains(self, situation: Situation) -> NDArray[np.float32]:
+        """(K, 2) what to expect of the candidates, as `expected` gives it.
 
         Raises:
             BadRequest: taught with other features.
             KeyError: an opinion is missing.
             NoGarment: no pixel of the view shows cloth.
         """
-        gains, goals = self.gains(situation)[:, TASKS.index(task)].astype(np.float64), situation.goals
-        if task == "flatten":
-            now = Relief.of(situation.view, situation.camera).area_m2
-            return now + gains * goals.flat_coverage_m2, now
-        now = -float(canonical_cost(situation.mesh.vertices[None], goals.goals)[0])
-        return now + gains, now
-
-    def gains(self, situation: Situation) -> NDArray[np.float32]:
-        """(K, 2) what to expect of the candidates, as `expected` gives it. Raises what `rated` does."""
         names, values = features(situation.heard(self.opinions))
         if names != self.names:
             raise BadRequest("the judge's weights were taught with other features; train them anew")
@@ -115,3 +105,21 @@ class Judge:
             hidden = hidden / (1 + np.exp(-hidden))  # SiLU
         weight, bias = layers[-1]
         return hidden @ weight.T + bias
+
+
+def rewards(situation: Situation, gains: NDArray, task: Task) -> tuple[NDArray[np.float64], float]:
+    """What gains (K, 2) make of a garment as it lies.
+
+    Returns:
+        (K,) rewards to expect of the candidates and that of doing nothing: coverage that is seen [m²], or minus the
+        canonical cost that is believed [m].
+
+    Raises:
+        NoGarment: no pixel of the view shows cloth.
+    """
+    more, goals = gains[:, TASKS.index(task)].astype(np.float64), situation.goals
+    if task == "flatten":
+        now = Relief.of(situation.view, situation.camera).area_m2
+        return now + more * goals.flat_coverage_m2, now
+    now = -float(canonical_cost(situation.mesh.vertices[None], goals.goals)[0])
+    return now + more, now

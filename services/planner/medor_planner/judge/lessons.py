@@ -1,7 +1,7 @@
 """What a judge is taught and examined with: all candidates of all states that were collected."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.progress import track
 
 from medor_planner.judge.features import features
-from medor_planner.judge.glance import Glance
 from medor_planner.judge.opinions import OPINIONS
 from medor_planner.judge.situation import Outcomes, load
 
@@ -38,14 +37,14 @@ class Lessons:
     garment: NDArray[np.int64]
 
     @classmethod
-    def read(cls, paths: Sequence[Path], glance: Glance) -> Self:
-        """All states that were collected, at each of which a glance says its word."""
+    def read(cls, paths: Sequence[Path]) -> Self:
+        """All states that were collected."""
         names: tuple[str, ...] = ()
         rows, gains, garment = [], [], []
         for path in track(paths, "features", console=Console(stderr=True), transient=True):
             situation, outcomes = load(path)
             situation = situation.heard(opinion.name for opinion in OPINIONS)
-            names, values = features(replace(situation, glanced=glance.gains(situation)))
+            names, values = features(situation)
             rows.append(values)
             gains.append(gained(outcomes))
             garment.append(np.full(len(values), outcomes.seed))

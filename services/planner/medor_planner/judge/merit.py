@@ -51,7 +51,6 @@ def compared(data: Lessons, expected: dict[str, NDArray[np.float32]]) -> dict[st
     for column, (task, feature) in enumerate(zip(TASKS, ("gain", "nearer"), strict=True)):
         gains = data.gains[:, column]
         ratings = {name: gain[:, column] for name, gain in expected.items()}
-        ratings["a glance"] = data.values[:, data.names.index(f"glance {feature}")]
         ratings |= {it.name: data.values[:, data.names.index(f"{it.name} {feature}")] for it in OPINIONS}
         ratings["the outcome itself"] = gains
         found[task] = {name: merit(rating, gains, data.state) for name, rating in ratings.items()}

@@ -39,7 +39,6 @@ class Situation:
         candidates: K of them.
         goals: of the mesh's canonical pose; all meshes share it.
         foreseen: by the name of the opinion.
-        glanced: (K, 2) what a glance expects: share of the flat coverage, metres of canonical cost; None before it.
     """
 
     view: DepthView
@@ -47,14 +46,12 @@ class Situation:
     candidates: Candidates
     goals: GoalSet
     foreseen: Mapping[str, Foreseen]
-    glanced: NDArray[np.float32] | None = None
 
     def among(self, chosen: NDArray[np.bool_]) -> Self:
         """The same decision among some of the candidates (K,)."""
         kept = np.concatenate([[True], chosen])
         foreseen = {name: Foreseen(one.mesh, one.positions[kept]) for name, one in self.foreseen.items()}
-        glanced = None if self.glanced is None else self.glanced[chosen]
-        return replace(self, candidates=self.candidates.where(chosen), foreseen=foreseen, glanced=glanced)
+        return replace(self, candidates=self.candidates.where(chosen), foreseen=foreseen)
 
     def hearing(self, more: Mapping[str, Foreseen]) -> Self:
         """The same decision, when more opinions are known."""
@@ -140,7 +137,7 @@ DECISIONS, GLANCES = "decisions", "glances"
 
 
 def save(path: Path, situation: Situation, outcomes: Outcomes) -> None:
-    """Write both to one file, at once; not what a glance said, which another will say otherwise."""
+    """Write both to one file, at once."""
     part = path.with_suffix(".part")
     with part.open("wb") as file:
         np.savez_compressed(file, **situation.arrays(), **{f"true_{k}": v for k, v in vars(outcomes).items()})

@@ -2,8 +2,7 @@
 
 A minute or two on one core. First every garment is judged by networks that have not seen it (cross-validation over
 garments): how well they rank, and what their favourite among a state's candidates brings, beside each model's
-favourite. Then networks are taught on all garments and written. What a glance says is among what they are told, so
-teach it first (`medor_planner.judge.train_glance`), on other garments.
+favourite. Then networks are taught on all garments and written.
 """
 
 import sys
@@ -23,8 +22,8 @@ from torch import Tensor, nn
 
 from medor_learn import weights
 from medor_learn.revision import revision
-from medor_planner.judge.glance import UNIT, Glance
-from medor_planner.judge.judge import FOLDER, LIMIT, SHIPPED, TASKS
+from medor_planner.judge.glance import UNIT
+from medor_planner.judge.judge import FOLDER, LIMIT, TASKS
 from medor_planner.judge.lessons import Lessons
 from medor_planner.judge.merit import compared, table
 from medor_planner.judge.opinions import OPINIONS
@@ -38,8 +37,6 @@ class Options:
     data: Path
     """Folder that `medor_planner.judge.collect` filled."""
     out: Path
-    glance: Path = SHIPPED
-    """Folder of weights with the glance that the judge will hear."""
     members: int = 6
     """Networks that are averaged."""
     hidden: int = 64
@@ -158,7 +155,7 @@ def main(options: Options) -> None:
     paths = sorted((options.data / DECISIONS).glob("*.npz"))
     if not paths:
         raise SystemExit(f"{options.data}: no states; collect some with `python -m medor_planner.judge.collect`")
-    data = Lessons.read(paths, Glance.load(options.glance))
+    data = Lessons.read(paths)
     before, history = earlier(data, options)
     metrics = {}
     if options.folds:
@@ -199,7 +196,7 @@ def write(
     }
     card = {
         "What it is": "Rates pick-and-place candidates: the gain in coverage and in closeness to the canonical pose to "
-        f"expect of each, from what the camera sees, what the mesh believes, a glance, and what models foresee: "
+        f"expect of each, from what the camera sees, what the mesh believes and what models foresee: "
         f"{', '.join(opinion.name for opinion in OPINIONS)}.",
         "Data": config["data"],
         "Schedule": schedule,

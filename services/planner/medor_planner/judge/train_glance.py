@@ -1,8 +1,8 @@
 """Teach a glance: `python -m medor_planner.judge.train_glance --data data/judge --out runs/glance`.
 
-Learns from what pulls truly brought (`medor_planner.judge.collect --glances`); one garment in eight is held out. About
-ten minutes on one core; the same command goes on where it was stopped. The best weights are in `best`; copied to
-`<judges>/glance` they are used. Needs torch.
+Learns from what pulls truly brought (`medor_planner.judge.collect`, with `--glances` or without); one garment in eight
+is held out. A few minutes on two cores; the same command goes on where it was stopped. The best weights are in `best`;
+in the folder `glance` of the judges' they are used.
 """
 
 import json
@@ -28,7 +28,7 @@ from medor_planner.judge.judge import TASKS
 from medor_planner.judge.lessons import gained
 from medor_planner.judge.merit import best_few, merit
 from medor_planner.judge.patches import Maps, Patches
-from medor_planner.judge.situation import GLANCES, load
+from medor_planner.judge.situation import DECISIONS, GLANCES, load
 
 HELD_OUT = 8
 """One garment in so many."""
@@ -41,7 +41,7 @@ class Options:
     """How to learn."""
 
     data: tuple[Path, ...]
-    """Folders that `medor_planner.judge.collect --glances` filled."""
+    """Folders that `medor_planner.judge.collect` filled."""
     out: Path
     epochs: int = 15
     batch: int = 128
@@ -144,7 +144,8 @@ class GlanceTask:
 
 
 def main(options: Options) -> None:
-    paths = sorted(path for folder in options.data for path in (folder / GLANCES).glob("*.npz"))
+    folders = [folder / kind for folder in options.data for kind in (GLANCES, DECISIONS)]
+    paths = sorted(path for folder in folders for path in folder.glob("*.npz"))
     if not paths:
         raise SystemExit("no states; collect some with `python -m medor_planner.judge.collect --glances`")
     sights = Sights.read(paths)
