@@ -1,6 +1,6 @@
 """What each candidate is expected to bring: a few small networks over its features, averaged.
 
-Learnt by `medor_planner.judge.train`; here they are matrices, so that planning needs no torch.
+Learnt by `medor_planner.judge.train`; here they are plain matrices.
 """
 
 import json
