@@ -201,12 +201,12 @@ class Garment:
             seed=self._seed,
         )
 
-    def _chosen(self, gains: NDArray, truth: NDArray | None) -> int:
-        """Which candidate to carry out, of what is expected of them (K, 2) and what truly comes, where known."""
+    def _chosen(self, gains: NDArray, truth: NDArray) -> int:
+        """Which candidate to carry out, of what is expected of them (K, 2) and what truly comes."""
         drawn, column = self._rng.random(), TASKS.index(self._task)
         if drawn < BY_JUDGE:
             return int(gains[:, column].argmax())
-        if drawn < BY_TRUTH and truth is not None:
+        if drawn < BY_TRUTH:
             return int(truth[:, column].argmax())
         return int(self._rng.integers(len(gains)))
 
