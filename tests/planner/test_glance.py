@@ -11,6 +11,7 @@ import torch
 from medor_planner.judge import situation as stored
 from medor_planner.judge.features import features, mirrored
 from medor_planner.judge.glance import FOLDER, Glance, GlanceNet
+from medor_planner.judge.lessons import Lessons
 from medor_planner.judge.patches import (
     HEIGHT_M,
     NEAR,
@@ -36,9 +37,8 @@ def seen(situation: Situation) -> Patches:
 
 def sights(patches: Patches, situation: Situation, gains: np.ndarray) -> Sights:
     names, values = features(situation.heard([]))
-    return Sights(
-        names, patches, values, gains.astype(np.float32), np.zeros(COUNT, np.int64), np.zeros(COUNT, np.int64)
-    )
+    alone = np.zeros(COUNT, np.int64)
+    return Sights(Lessons(names, values, gains.astype(np.float32), alone, alone), patches)
 
 
 def test_a_pull_looks_to_the_right_from_the_pick(situation):
@@ -100,12 +100,12 @@ def test_the_network_overfits_one_batch(situation):
     gains = np.random.default_rng(0).normal(size=(COUNT, 2)) * [0.05, 0.008]
     some = sights(seen(situation), situation, gains)
     torch.manual_seed(0)
-    network = GlanceNet(len(some.names))
+    network = GlanceNet(len(some.lessons.names))
     for part in network.modules():
         if isinstance(part, torch.nn.Dropout):
             part.p = 0.0
-    network.mean.copy_(torch.from_numpy(some.values.mean(axis=0)))
-    network.scale.copy_(torch.from_numpy(some.values.std(axis=0) + 1e-6))
+    network.mean.copy_(torch.from_numpy(some.lessons.values.mean(axis=0)))
+    network.scale.copy_(torch.from_numpy(some.lessons.values.std(axis=0) + 1e-6))
     task, optimizer = GlanceTask(network, some, some, batch=32, seed=0), torch.optim.Adam(network.parameters(), 2e-3)
     losses = []
     for step in range(150):

@@ -1,7 +1,7 @@
 """What a judge is taught and examined with: all candidates of all states that were collected."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
@@ -12,7 +12,7 @@ from rich.progress import track
 
 from medor_planner.judge.features import features
 from medor_planner.judge.opinions import OPINIONS
-from medor_planner.judge.situation import Outcomes, load
+from medor_planner.judge.situation import Outcomes, Situation, load
 
 LOST_M = 0.1
 """Canonical cost of a vertex that leaves the picture, on top of its own [m]."""
@@ -38,18 +38,35 @@ class Lessons:
 
     @classmethod
     def read(cls, paths: Sequence[Path]) -> Self:
-        """All states that were collected."""
+        """All states that were collected, with what all models foresaw."""
+        every = [opinion.name for opinion in OPINIONS]
+        return cls.of((situation.heard(every), outcomes) for situation, outcomes in stored(paths))
+
+    @classmethod
+    def of(cls, states: Iterable[tuple[Situation, Outcomes]]) -> Self:
+        """What is known at each state, and what came."""
         names: tuple[str, ...] = ()
         rows, gains, garment = [], [], []
-        for path in track(paths, "features", console=Console(stderr=True), transient=True):
-            situation, outcomes = load(path)
-            situation = situation.heard(opinion.name for opinion in OPINIONS)
+        for situation, outcomes in states:
             names, values = features(situation)
             rows.append(values)
             gains.append(gained(outcomes))
             garment.append(np.full(len(values), outcomes.seed))
         state = np.repeat(np.arange(len(rows)), [len(values) for values in rows])
         return cls(names, np.concatenate(rows), np.concatenate(gains), state, np.concatenate(garment))
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def where(self, chosen: NDArray) -> Self:
+        """Some of the candidates, by number or by mask."""
+        parts = {name: getattr(self, name)[chosen] for name in ("values", "gains", "state", "garment")}
+        return replace(self, **parts)
+
+
+def stored(paths: Sequence[Path]) -> Iterator[tuple[Situation, Outcomes]]:
+    """What `medor_planner.judge.collect` wrote, with a bar."""
+    return (load(path) for path in track(paths, "lessons", console=Console(stderr=True), transient=True))
 
 
 def gained(outcomes: Outcomes) -> NDArray[np.float32]:

@@ -7,7 +7,7 @@ in the folder `glance` of the judges' they are used.
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -16,19 +16,17 @@ import numpy as np
 import torch
 import tyro
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.progress import track
 from torch import Tensor, nn
 
 from medor_learn.loop import Schedule, train
 from medor_learn.run import SCORE
-from medor_planner.judge.features import features, mirrored
+from medor_planner.judge.features import mirrored
 from medor_planner.judge.glance import GlanceNet
 from medor_planner.judge.judge import TASKS
-from medor_planner.judge.lessons import gained
+from medor_planner.judge.lessons import Lessons, stored
 from medor_planner.judge.merit import best_few, merit
 from medor_planner.judge.patches import Maps, Patches
-from medor_planner.judge.situation import DECISIONS, GLANCES, load
+from medor_planner.judge.situation import DECISIONS, GLANCES, Outcomes, Situation
 
 HELD_OUT = 8
 """One garment in so many."""
@@ -55,58 +53,34 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Sights:
-    """Pulls of many states.
+    """Lessons before any model is heard, with what is seen of each pull."""
 
-    Attributes:
-        names: (F) features.
-        patches: of N pulls.
-        values: (N, F).
-        gains: (N, 2) share of the flat coverage, metres of canonical cost.
-        state: (N,) number of the state.
-        garment: (N,) seed of the garment.
-    """
-
-    names: tuple[str, ...]
+    lessons: Lessons
     patches: Patches
-    values: NDArray[np.float32]
-    gains: NDArray[np.float32]
-    state: NDArray[np.int64]
-    garment: NDArray[np.int64]
 
     @classmethod
     def read(cls, paths: Sequence[Path]) -> Self:
-        names: tuple[str, ...] = ()
-        patches, values, gains, garment = [], [], [], []
-        for path in track(paths, "patches", console=Console(stderr=True), transient=True):
-            situation, outcomes = load(path)
-            situation = situation.heard([])
-            names, known = features(situation)
-            patches.append(Maps.of(situation).around(situation.candidates))
-            values.append(known)
-            gains.append(gained(outcomes))
-            garment.append(np.full(len(known), outcomes.seed))
-        state = np.repeat(np.arange(len(values)), [len(known) for known in values])
-        every = Patches(np.concatenate([it.near for it in patches]), np.concatenate([it.wide for it in patches]))
-        return cls(names, every, np.concatenate(values), np.concatenate(gains), state, np.concatenate(garment))
+        """All states that were collected."""
+        patches: list[Patches] = []
 
-    def __len__(self) -> int:
-        return len(self.values)
+        def seen() -> Iterator[tuple[Situation, Outcomes]]:
+            for situation, outcomes in stored(paths):
+                patches.append(Maps.of(situation).around(situation.candidates))
+                yield situation.heard([]), outcomes
 
-    def of(self, rows: NDArray) -> Self:
+        lessons = Lessons.of(seen())
+        near, wide = (np.concatenate([getattr(it, maps) for it in patches]) for maps in ("near", "wide"))
+        return cls(lessons, Patches(near, wide))
+
+    def where(self, chosen: NDArray) -> Self:
         """Some of the pulls, by number or by mask."""
-        patches = Patches(self.patches.near[rows], self.patches.wide[rows])
-        return replace(
-            self,
-            patches=patches,
-            values=self.values[rows],
-            gains=self.gains[rows],
-            state=self.state[rows],
-            garment=self.garment[rows],
-        )
+        patches = Patches(self.patches.near[chosen], self.patches.wide[chosen])
+        return replace(self, lessons=self.lessons.where(chosen), patches=patches)
 
     def mirrored(self) -> Self:
         """The same in a mirror."""
-        return replace(self, patches=self.patches.mirrored, values=self.values[:, mirrored(self.names)])
+        lessons = replace(self.lessons, values=self.lessons.values[:, mirrored(self.lessons.names)])
+        return replace(self, lessons=lessons, patches=self.patches.mirrored)
 
 
 class GlanceTask:
@@ -119,11 +93,12 @@ class GlanceTask:
     def loss(self, step: int) -> Tensor:
         """Huber's, in units."""
         rng = np.random.default_rng((self._seed, step))
-        some = self._taught.of(rng.integers(len(self._taught), size=self._batch))
+        some = self._taught.where(rng.integers(len(self._taught.lessons), size=self._batch))
         if rng.random() < 0.5:
             some = some.mirrored()
         near, wide, values, gains = (
-            torch.from_numpy(it).float() for it in (some.patches.near, some.patches.wide, some.values, some.gains)
+            torch.from_numpy(it).float()
+            for it in (some.patches.near, some.patches.wide, some.lessons.values, some.lessons.gains)
         )
         values += NOISE * self.module.scale * torch.randn_like(values)
         said = self.module(near, wide, values)
@@ -131,8 +106,8 @@ class GlanceTask:
 
     def validate(self) -> dict[str, float]:
         """The same loss, and the merit of its word, on held-out garments."""
-        there = self._held_out
-        said, unit = self.module.gains(there.patches, there.names, there.values), self.module.unit.numpy()
+        there, unit = self._held_out.lessons, self.module.unit.numpy()
+        said = self.module.gains(self._held_out.patches, there.names, there.values)
         apart = torch.from_numpy(said / unit), torch.from_numpy(there.gains / unit)
         found = {SCORE: float(nn.functional.smooth_l1_loss(*apart))}
         for column, task in enumerate(TASKS):
@@ -149,14 +124,15 @@ def main(options: Options) -> None:
     if not paths:
         raise SystemExit("no states; collect some with `python -m medor_planner.judge.collect --glances`")
     sights = Sights.read(paths)
-    garments = np.unique(sights.garment)
-    aside = np.isin(sights.garment, garments[::HELD_OUT])
-    taught, held_out = sights.of(~aside), sights.of(aside)
+    lessons = sights.lessons
+    garments = np.unique(lessons.garment)
+    aside = np.isin(lessons.garment, garments[::HELD_OUT])
+    taught, held_out = sights.where(~aside), sights.where(aside)
     torch.manual_seed(options.seed)
-    network = GlanceNet(len(sights.names))
-    network.mean.copy_(torch.from_numpy(taught.values.mean(axis=0)))
-    network.scale.copy_(torch.from_numpy(taught.values.std(axis=0) + 1e-6))
-    of_an_epoch = max(len(taught) // options.batch, 1)
+    network = GlanceNet(len(lessons.names))
+    network.mean.copy_(torch.from_numpy(taught.lessons.values.mean(axis=0)))
+    network.scale.copy_(torch.from_numpy(taught.lessons.values.std(axis=0) + 1e-6))
+    of_an_epoch = max(len(taught.lessons) // options.batch, 1)
     schedule = Schedule(
         steps=options.epochs * of_an_epoch,
         lr=options.lr,
@@ -168,10 +144,10 @@ def main(options: Options) -> None:
     card = {
         "What it is": "Rates pick-and-place candidates at first sight: the gain in coverage and in closeness to the "
         "canonical pose to expect of each, from maps of what the camera sees and of what the mesh believes around it.",
-        "features": list(sights.names),
+        "features": list(lessons.names),
         "data": {
-            "states": int(sights.state[-1]) + 1,
-            "pulls": len(sights),
+            "states": int(lessons.state[-1]) + 1,
+            "pulls": len(lessons),
             "garment_seeds": [int(garments[0]), int(garments[-1])],
             "held_out": [int(seed) for seed in garments[::HELD_OUT]],
         },
