@@ -10,7 +10,7 @@ import torch
 
 from medor_planner.judge import situation as stored
 from medor_planner.judge.features import features, mirrored
-from medor_planner.judge.glance import FOLDER, Glance, GlanceNet
+from medor_planner.judge.glance import FOLDER, Glance, GlanceNet, promised
 from medor_planner.judge.lessons import Lessons
 from medor_planner.judge.patches import (
     HEIGHT_M,
@@ -91,9 +91,18 @@ def test_a_glance_says_the_same_of_a_pull_and_its_mirror_image(situation):
     names, values = features(situation.heard([]))
     torch.manual_seed(0)
     network, patches = GlanceNet(len(names)).eval(), seen(situation)
-    said = network.gains(patches, names, values)
-    np.testing.assert_allclose(network.gains(patches.mirrored, names, values[:, mirrored(names)]), said, atol=1e-6)
+    said = promised(network.words(patches, names, values))
+    mirror = promised(network.words(patches.mirrored, names, values[:, mirrored(names)]))
+    np.testing.assert_allclose(mirror, said, atol=1e-6)
     assert said.std() > 0
+
+
+def test_of_pulls_with_the_same_mean_the_one_all_agree_on_is_promised_more():
+    agreed, disputed = np.full((6, 1, 2), 0.05, np.float32), np.full((6, 1, 2), 0.05, np.float32)
+    disputed[::2] += 0.04
+    disputed[1::2] -= 0.04
+    words = np.concatenate([agreed, disputed], axis=1)
+    np.testing.assert_allclose(promised(words), [[0.05, 0.05], [0.01, 0.01]], atol=1e-6)
 
 
 def test_the_network_overfits_one_batch(situation):

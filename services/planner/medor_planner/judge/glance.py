@@ -2,7 +2,7 @@
 
 A convolutional network over the patches of each pull and what else is known of it, learnt by
 `medor_planner.judge.train_glance` from what pulls truly brought. A pull and its mirror image bring the same: it looks
-at both and takes the mean.
+at both. The best of many pulls is often one that somebody is wrong about, so where its words differ it promises less.
 """
 
 from pathlib import Path
@@ -29,7 +29,9 @@ SAID = 96
 HIDDEN = 128
 TOWER_DROPOUT, DROPOUT = 0.2, 0.3
 MEMBERS = 3
-"""Networks whose word is averaged."""
+"""Networks that look at the same."""
+CAUTION = 1.0
+"""Standard deviations of their words that are taken off the mean."""
 UNIT = (0.05, 0.008)
 """Typical gains: share of the flat coverage, metres of canonical cost."""
 BATCH = 100
@@ -89,16 +91,20 @@ class GlanceNet(nn.Module):
         return torch.stack([member(near, wide, known) for member in self.members])
 
     @torch.inference_mode()
-    def gains(self, patches: Patches, names: tuple[str, ...], values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(K, 2) share of the flat coverage, metres of canonical cost: means over members, mirrored or not."""
+    def words(self, patches: Patches, names: tuple[str, ...], values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(W, K, 2) share of the flat coverage, metres of canonical cost: what every member says, and in a mirror."""
         both = ((patches, values), (patches.mirrored, values[:, mirrored(names)]))
-        said = [self._said(*one) for one in both]
-        return (torch.stack(said).mean(0) * self.unit).numpy()
+        return (torch.cat([self._said(*one) for one in both]) * self.unit).numpy()
 
     def _said(self, patches: Patches, values: NDArray[np.float32]) -> Tensor:
         parts = [slice(start, start + BATCH) for start in range(0, len(values), BATCH)]
         arrays = (patches.near, patches.wide, values)
-        return torch.cat([self(*(torch.from_numpy(it[part]).float() for it in arrays)).mean(0) for part in parts])
+        return torch.cat([self(*(torch.from_numpy(it[part]).float() for it in arrays)) for part in parts], dim=1)
+
+
+def promised(words: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(K, 2) what words (W, K, 2) can be relied on for."""
+    return words.mean(axis=0) - CAUTION * words.std(axis=0)
 
 
 class Glance:
@@ -135,4 +141,4 @@ class Glance:
         names, values = features(situation.heard([]))
         if names != self._names:
             raise BadRequest("the glance's weights were taught with other features; train them anew")
-        return self._network.gains(Maps.of(situation).around(situation.candidates), names, values)
+        return promised(self._network.words(Maps.of(situation).around(situation.candidates), names, values))

@@ -6,6 +6,7 @@ in the folder `glance` of the judges' they are used.
 """
 
 import json
+import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from torch import Tensor, nn
 from medor_learn.loop import Schedule, train
 from medor_learn.run import SCORE
 from medor_planner.judge.features import mirrored
-from medor_planner.judge.glance import GlanceNet
+from medor_planner.judge.glance import GlanceNet, promised
 from medor_planner.judge.judge import TASKS
 from medor_planner.judge.lessons import Lessons, stored
 from medor_planner.judge.merit import best_few, merit
@@ -107,8 +108,9 @@ class GlanceTask:
     def validate(self) -> dict[str, float]:
         """The same loss, and the merit of its word, on held-out garments."""
         there, unit = self._held_out.lessons, self.module.unit.numpy()
-        said = self.module.gains(self._held_out.patches, there.names, there.values)
-        apart = torch.from_numpy(said / unit), torch.from_numpy(there.gains / unit)
+        words = self.module.words(self._held_out.patches, there.names, there.values)
+        apart = torch.from_numpy(words.mean(axis=0) / unit), torch.from_numpy(there.gains / unit)
+        said = promised(words)
         found = {SCORE: float(nn.functional.smooth_l1_loss(*apart))}
         for column, task in enumerate(TASKS):
             one = merit(said[:, column], there.gains[:, column], there.state)
@@ -141,9 +143,13 @@ def main(options: Options) -> None:
         seed=options.seed,
         threads=options.threads,
     )
+    command = ["python", "-m", "medor_planner.judge.train_glance"]
+    asked = ("epochs", "batch", "lr", "decay", "seed", "threads")
+    command += [word for name in asked for word in (f"--{name}", str(getattr(options, name)))]
     card = {
         "What it is": "Rates pick-and-place candidates at first sight: the gain in coverage and in closeness to the "
         "canonical pose to expect of each, from maps of what the camera sees and of what the mesh believes around it.",
+        "command": shlex.join(command),
         "features": list(lessons.names),
         "data": {
             "states": int(lessons.state[-1]) + 1,
