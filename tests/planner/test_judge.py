@@ -28,7 +28,7 @@ from medor_planner.sampling import Candidates
 from medor_wire import endpoints
 from medor_wire.bus import Call
 from medor_wire.errors import BadRequest, NoGarment
-from medor_wire.messages import CameraInfo, DepthView, PlanRequest
+from medor_wire.messages import CameraInfo, DepthView, Empty, PlanRequest
 from tests.planner.decisions import COUNT, turned
 
 
@@ -213,13 +213,16 @@ def test_what_the_shipped_ones_expect_has_the_units_of_the_task(situation, task,
         assert (np.abs(expected - now) < 0.1).all()
 
 
-def test_a_judged_plan_hears_all_models_and_is_the_same_again(full_lab):
-    asked = PlanRequest(category="tshirt", method="medor+judge", candidates=30, seed=3)
+@pytest.mark.parametrize("method", ["medor+judge", "oracle-mesh+judge"])
+def test_a_judged_plan_hears_all_models_and_is_the_same_again(full_lab, method):
+    asked = PlanRequest(category="tshirt", method=method, candidates=30, seed=3)
     one, two = (full_lab.bus.ask(endpoints.PLAN, asked) for _ in range(2))
     assert {"reconstruct", "screen", "rollout", "judge"} <= set(one.timings_ms)
     assert (one.candidates, one.survivors) == (30 * GLANCES, 20)
     np.testing.assert_array_equal(one.top_rewards, two.top_rewards)
     assert one.no_op == (one.top_rewards.max() <= one.no_op_reward)
+    truth = full_lab.bus.ask(endpoints.TRUTH, Empty()).mesh.vertices
+    assert np.array_equal(one.mesh.vertices, truth) == (method == "oracle-mesh+judge")
 
 
 @pytest.mark.parametrize("judge", [SHIPPED, None])

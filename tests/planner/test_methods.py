@@ -36,6 +36,11 @@ def test_with_physics_differs_from_the_learned_method_in_dynamics_alone():
         )
 
 
+def test_the_true_mesh_is_judged_as_a_completed_one_is():
+    true, completed = method_named("oracle-mesh+judge"), method_named("medor+judge")
+    assert true == replace(completed, name=true.name, recon=None)
+
+
 def test_partial_reward_sees_what_medor_sees_and_judges_less():
     partial, medor = method_named("partial-reward"), method_named("medor")
     assert (partial.recon, partial.goals) == (medor.recon, medor.goals)

@@ -44,15 +44,19 @@ COMPLETED = tuple(
 )
 """The mesh completed from the view, rolled out by the learned model; goals are made of its own canonical pose. First
 MEDOR, then the ablations of its reconstruction."""
-JUDGED = Method("medor+judge", recon="medor", dynamics="layerless", goals="mesh", judged=True)
-"""The completed mesh, rolled out by the cloth solver, on lengths kept, and by the learned model; the judge decides."""
+JUDGED = tuple(
+    Method(name, recon, dynamics="layerless", goals="mesh", judged=True)
+    for name, recon in (("medor+judge", "medor"), ("oracle-mesh+judge", None))
+)
+"""The completed mesh, rolled out by the cloth solver, on lengths kept, and by the learned model; the judge decides. The
+same on the true mesh, simulation only: what reconstruction costs."""
 PARTIAL_REWARD = replace(COMPLETED[0], name="partial-reward", visible_reward=True)
 """MEDOR, judging only what it saw (MEDOR, ablations)."""
 LEARNED = (*COMPLETED, PARTIAL_REWARD)
 
 METHODS = {
     method.name: method
-    for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM, JUDGED, *LEARNED, *(each.with_physics for each in LEARNED))
+    for method in (VISIBLE, ORACLE, ORACLE_MESH, RANDOM, *JUDGED, *LEARNED, *(each.with_physics for each in LEARNED))
 }
 """All by name. `+physics`: the same with the cloth solver, MEDOR's ground-truth dynamics."""
 

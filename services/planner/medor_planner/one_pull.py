@@ -202,7 +202,7 @@ def rated(bus: Bus, method: Method, category: Category, task: Task, candidates: 
             category=category, task=task, method=method.name, candidates=len(candidates), exhaustive=True
         )
         hearing, stages = Hearing(bus, Goals(bus)), Stages(Call(), lambda progress: None)
-        choice = hearing.choice(asked, Scene(mesh, view), candidates, stages, cancel)
+        choice = hearing.choice(method, asked, Scene(mesh, view), candidates, stages, cancel)
         return np.r_[choice.no_op_reward or 0.0, choice.rewards]
     reward = Reward(task=task, visible_only=method.visible_reward)
     if task == "canonicalize":

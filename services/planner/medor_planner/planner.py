@@ -93,7 +93,9 @@ class Planner:
                 with stages.stage("sample"):
                     count = request.candidates * (self._glances if method.judged else 1)
                     candidates = sample(scene, count, rng, reachable=reachable)
-                decide = self._hearing.choice if method.judged else partial(self._shoot, method, reward)
+                decide = (
+                    partial(self._hearing.choice, method) if method.judged else partial(self._shoot, method, reward)
+                )
                 choice = decide(request, scene, candidates, stages, cancel)
         plan = choice.plan(request, scene.mesh, stages.total())
         self._plans.add(plan)

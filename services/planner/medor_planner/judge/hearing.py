@@ -11,6 +11,7 @@ from medor_planner.judge.glance import Glance
 from medor_planner.judge.judge import SHIPPED, TASKS, Judge, rewards
 from medor_planner.judge.opinions import OPINIONS, consulted, reconstructed
 from medor_planner.judge.situation import Situation
+from medor_planner.methods import Method
 from medor_planner.sampling import Candidates, Scene
 from medor_planner.screening import AT_LEAST, best
 from medor_planner.shooting import CHUNK
@@ -40,11 +41,18 @@ class Hearing:
         self._glance, self._judge = cache(lambda: Glance.load(weights)), cache(lambda: Judge.load(weights))
 
     def choice(
-        self, request: PlanRequest, scene: Scene, drawn: Candidates, stages: Stages, cancel: threading.Event
+        self,
+        method: Method,
+        request: PlanRequest,
+        scene: Scene,
+        drawn: Candidates,
+        stages: Stages,
+        cancel: threading.Event,
     ) -> Choice:
         """The candidates that were rolled out, with the rewards to expect of them.
 
         Args:
+            method: whose mesh the scene has; where it is the true one all models are asked about that.
             request: what is asked for.
             scene: the garment as seen.
             drawn: pulls to glance at.
@@ -55,9 +63,10 @@ class Hearing:
             BadRequest: no weights, or of other features.
             MedorError: what the services asked say.
         """
-        known = {OPINIONS[0].recon: scene.mesh}
+        recons = dict.fromkeys(opinion.recon for opinion in OPINIONS)
+        known = dict.fromkeys([method.recon] if method.recon else recons, scene.mesh)
         with stages.stage("reconstruct"):
-            others = [opinion.recon for opinion in OPINIONS if opinion.recon not in known]
+            others = [recon for recon in recons if recon not in known]
             meshes = known | reconstructed(self._bus, scene.view, request.category, others, cancel)
         with stages.stage("goals"):
             goals = self._goals.of(canonical_of(scene.mesh), cancel)
