@@ -12,7 +12,7 @@ from benchmarks.episodes import Variant
 from benchmarks.published import METHODS
 
 COLOURS = (
-    "#1b1b1b", "#7a7a7a", "#0a3d6b", "#0b5fa5", "#0b5fa5", "#e07b00", "#b3202a", "#d66ba0", "#7b3fa0",
+    "#1b1b1b", "#7a7a7a", "#5a7f2b", "#0a3d6b", "#0b5fa5", "#0b5fa5", "#e07b00", "#b3202a", "#d66ba0", "#7b3fa0",
     "#1f8a4c", "#8c564b", "#12a0a8", "#b0b0b0",
 )  # fmt: skip
 """By method, in the order of the table. With the solver in place of learned dynamics a line is dashed."""

@@ -32,8 +32,8 @@ ABLATION = {
     "oracle": Published("GT mesh, GT dynamics", 0.870, 0.076),
 }
 """By our method. All but `medor+physics` and `oracle` plan with learned dynamics: an ablation of ours that plans with
-the solver (`joint+physics`) has no counterpart. Nor have `medor+judge`, `oracle-mesh+judge`, `visible` and `random`; nearest to `visible`
-comes VCD."""
+the solver (`joint+physics`) has no counterpart. Nor have `medor+judge`, `oracle-mesh+judge`, `visible` and `random`;
+nearest to `visible` comes VCD."""
 
 VCD = Published("VCD", 0.391, 0.174)
 
