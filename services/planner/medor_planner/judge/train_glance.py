@@ -106,16 +106,22 @@ class GlanceTask:
         return nn.functional.smooth_l1_loss(said, (gains / self.module.unit).expand_as(said))
 
     def validate(self) -> dict[str, float]:
-        """The same loss, and the merit of its word, on held-out garments."""
+        """The same loss, and the merit of its word, on held-out garments; with and without the caution of its word."""
         there, unit = self._held_out.lessons, self.module.unit.numpy()
         words = self.module.words(self._held_out.patches, there.names, there.values)
-        apart = torch.from_numpy(words.mean(axis=0) / unit), torch.from_numpy(there.gains / unit)
-        said = promised(words)
+        said, mean = promised(words), words.mean(axis=0)
+        apart = torch.from_numpy(mean / unit), torch.from_numpy(there.gains / unit)
         found = {SCORE: float(nn.functional.smooth_l1_loss(*apart))}
         for column, task in enumerate(TASKS):
             one = merit(said[:, column], there.gains[:, column], there.state)
+            rash = merit(mean[:, column], there.gains[:, column], there.state)
             found |= {f"{task} rank": one.rank, f"{task} favourite brings": one.gain}
-            for who, rated in (("few bring", said), ("few could bring", there.gains)):
+            found[f"{task} favourite without caution brings"] = rash.gain
+            for who, rated in (
+                ("few bring", said),
+                ("few without caution bring", mean),
+                ("few could bring", there.gains),
+            ):
                 found[f"{task} {who}"] = best_few(rated[:, column], there.gains[:, column], there.state)
         return found
 
