@@ -109,20 +109,18 @@ class GlanceTask:
         """The same loss, and the merit of its word, on held-out garments; with and without the caution of its word."""
         there, unit = self._held_out.lessons, self.module.unit.numpy()
         words = self.module.words(self._held_out.patches, there.names, there.values)
-        said, mean = promised(words), words.mean(axis=0)
-        apart = torch.from_numpy(mean / unit), torch.from_numpy(there.gains / unit)
-        found = {SCORE: float(nn.functional.smooth_l1_loss(*apart))}
+        mean = words.mean(axis=0)
+        off = nn.functional.smooth_l1_loss(torch.from_numpy(mean / unit), torch.from_numpy(there.gains / unit))
+        found = {SCORE: float(off)}
+        for who, rated in (("", promised(words)), (" without caution", mean)):
+            for column, task in enumerate(TASKS):
+                one = merit(rated[:, column], there.gains[:, column], there.state)
+                few = best_few(rated[:, column], there.gains[:, column], there.state)
+                found |= {f"{task} rank{who}": one.rank, f"{task} favourite{who} brings": one.gain}
+                found[f"{task} few{who} bring"] = few
         for column, task in enumerate(TASKS):
-            one = merit(said[:, column], there.gains[:, column], there.state)
-            rash = merit(mean[:, column], there.gains[:, column], there.state)
-            found |= {f"{task} rank": one.rank, f"{task} favourite brings": one.gain}
-            found[f"{task} favourite without caution brings"] = rash.gain
-            for who, rated in (
-                ("few bring", said),
-                ("few without caution bring", mean),
-                ("few could bring", there.gains),
-            ):
-                found[f"{task} {who}"] = best_few(rated[:, column], there.gains[:, column], there.state)
+            gains = there.gains[:, column]
+            found[f"{task} few could bring"] = best_few(gains, gains, there.state)
         return found
 
 
