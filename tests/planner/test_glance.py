@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import load_file
 
 from medor_planner.judge import situation as stored
 from medor_planner.judge.features import features, mirrored
@@ -39,6 +40,14 @@ def sights(patches: Patches, situation: Situation, gains: np.ndarray) -> Sights:
     names, values = features(situation.heard([]))
     alone = np.zeros(COUNT, np.int64)
     return Sights(Lessons(names, values, gains.astype(np.float32), alone, alone), patches)
+
+
+def collected(situation: Situation, folder: Path) -> None:
+    """Lessons of two garments."""
+    (folder / stored.GLANCES).mkdir()
+    for seed in (7, 8):
+        outcomes = Outcomes(np.linspace(0.02, 0.03, 13), np.arange(13.0) / 100, np.ones(13), 0.05, seed)
+        stored.save(folder / stored.GLANCES / f"{seed}.npz", situation.heard([]), outcomes)
 
 
 def test_a_pull_looks_to_the_right_from_the_pick(situation):
@@ -129,16 +138,26 @@ def test_the_network_overfits_one_batch(situation):
 def test_a_glance_is_taught_from_what_was_collected_and_loads(situation, tmp_path):
     with pytest.raises(SystemExit, match=r"medor_planner\.judge\.collect"):
         train(Options((tmp_path,), tmp_path / "run"))
-    (tmp_path / stored.GLANCES).mkdir()
-    for seed in (7, 8):
-        outcomes = Outcomes(np.linspace(0.02, 0.03, 13), np.arange(13.0) / 100, np.ones(13), 0.05, seed)
-        stored.save(tmp_path / stored.GLANCES / f"{seed}.npz", situation.heard([]), outcomes)
+    collected(situation, tmp_path)
     train(Options((tmp_path,), tmp_path / "run", epochs=2, batch=4))
     (tmp_path / "run/best").rename(tmp_path / FOLDER)
     config = json.loads((tmp_path / FOLDER / "config.json").read_text())
     assert (config["data"]["states"], config["data"]["pulls"]) == (2, 2 * COUNT)
     assert set(config["data"]["held_out"]) < {7, 8}
     assert Glance.load(tmp_path).gains(situation).shape == (COUNT, 2)
+
+
+def test_more_lessons_can_be_blended_with_what_was_known(situation, tmp_path):
+    """The weights left are the mean of those begun with and those learnt since, and the card says so."""
+    collected(situation, tmp_path)
+    first, then = tmp_path / "first", tmp_path / "then"
+    train(Options((tmp_path,), first, epochs=1, batch=4))
+    train(Options((tmp_path,), then, epochs=1, batch=4, lr=0.01, start=first / "best", keep=0.5))
+    one, two, mean = (load_file(it / "weights.safetensors") for it in (first / "best", then / "best", then / "blended"))
+    name = "members.0.head.1.weight"
+    assert not torch.allclose(one[name], two[name])
+    torch.testing.assert_close(mean[name], (one[name] + two[name]) / 2)
+    assert json.loads((then / "blended/config.json").read_text())["kept of the start"] == 0.5
 
 
 def test_what_the_shipped_glance_says_does_not_depend_on_how_many_it_is_asked_about(situation):

@@ -1,8 +1,9 @@
 """Teach a glance: `python -m medor_planner.judge.train_glance --data data/judge --out runs/glance`.
 
 Learns from what pulls truly brought (`medor_planner.judge.collect`, with `--glances` or without); one garment in eight
-is held out. A few minutes on two cores; the same command goes on where it was stopped. The best weights are in `best`;
-in the folder `glance` of the judges' they are used.
+is held out. A few minutes on two cores; the same command goes on where it was stopped. The best weights are in `best`,
+or in `blended` where they are to stay near those that they began with; in the folder `glance` of the judges' they are
+used.
 """
 
 import json
@@ -19,6 +20,7 @@ import tyro
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from medor_learn import weights
 from medor_learn.loop import Schedule, train
 from medor_learn.run import SCORE
 from medor_planner.judge.features import mirrored
@@ -50,6 +52,9 @@ class Options:
     threads: int = 1
     start: Path | None = None
     """Folder of weights to go on from."""
+    keep: float = 0.0
+    """Share of these weights in what is left in `blended`, the last weights being the rest: half of them remembers
+    lessons that are not among the data any more, and does better than either."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +153,7 @@ def main(options: Options) -> None:
         threads=options.threads,
     )
     command = ["python", "-m", "medor_planner.judge.train_glance"]
-    asked = ("epochs", "batch", "lr", "decay", "seed", "threads")
+    asked = ("epochs", "batch", "lr", "decay", "seed", "threads", "keep")
     command += [word for name in asked for word in (f"--{name}", str(getattr(options, name)))]
     card = {
         "What it is": "Rates pick-and-place candidates at first sight: the gain in coverage and in closeness to the "
@@ -164,7 +169,26 @@ def main(options: Options) -> None:
     }
     task = GlanceTask(network, taught, held_out, options.batch, options.seed)
     done = train(task, options.out, schedule, card=card, start=options.start)
+    if options.start and options.keep:
+        done["blended"] = blend(task, options.out, options.start, options.keep)
     sys.stdout.write(json.dumps(done) + "\n")
+
+
+def blend(task: GlanceTask, out: Path, start: Path, keep: float) -> dict[str, float]:
+    """Mean of the weights that a task ended with and of those that it began with (WiSE-FT, Wortsman et al. 2022,
+    section 3), examined and left in `blended`. Returns what came of the examination."""
+    module = task.module.eval()
+    last = {name: tensor.clone() for name, tensor in module.state_dict().items()}
+    weights.start(module, start)
+    module.load_state_dict(
+        {
+            name: torch.lerp(last[name].double(), tensor.double(), keep).to(tensor.dtype)
+            for name, tensor in module.state_dict().items()
+        }
+    )
+    config = weights.read_config(out / "best") | {"metrics": task.validate(), "kept of the start": keep}
+    weights.save(out / "blended", module, config, config)
+    return config["metrics"]
 
 
 if __name__ == "__main__":
