@@ -158,6 +158,8 @@ def test_more_lessons_can_be_blended_with_what_was_known(situation, tmp_path):
     assert not torch.allclose(one[name], two[name])
     torch.testing.assert_close(mean[name], (one[name] + two[name]) / 2)
     assert json.loads((then / "blended/config.json").read_text())["kept of the start"] == 0.5
+    with pytest.raises(SystemExit, match="--start"):
+        train(Options((tmp_path,), tmp_path / "none", keep=0.5))
 
 
 def test_what_the_shipped_glance_says_does_not_depend_on_how_many_it_is_asked_about(situation):

@@ -130,6 +130,8 @@ class GlanceTask:
 
 
 def main(options: Options) -> None:
+    if options.keep and not options.start:
+        raise SystemExit("--keep: a share of which weights? name their folder with --start")
     folders = [folder / kind for folder in options.data for kind in (GLANCES, DECISIONS)]
     paths = sorted(path for folder in folders for path in folder.glob("*.npz"))
     if not paths:
@@ -169,7 +171,7 @@ def main(options: Options) -> None:
     }
     task = GlanceTask(network, taught, held_out, options.batch, options.seed)
     done = train(task, options.out, schedule, card=card, start=options.start)
-    if options.start and options.keep:
+    if options.keep and options.start:
         done["blended"] = blend(task, options.out, options.start, options.keep)
     sys.stdout.write(json.dumps(done) + "\n")
 
