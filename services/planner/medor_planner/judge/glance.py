@@ -132,7 +132,7 @@ class Glance:
         return cls(network, names)
 
     def gains(self, situation: Situation) -> NDArray[np.float32]:
-        """(K, 2) what to expect of the candidates: share of the flat coverage, metres of canonical cost.
+        """(K, 2) what the candidates promise to bring: share of the flat coverage, metres of canonical cost.
 
         Raises:
             BadRequest: taught with other features.

@@ -171,7 +171,7 @@ def main(options: Options) -> None:
     }
     task = GlanceTask(network, taught, held_out, options.batch, options.seed)
     done = train(task, options.out, schedule, card=card, start=options.start)
-    if options.keep and options.start:
+    if options.keep and options.start and done["ended"] != "interrupted":
         done["blended"] = blend(task, options.out, options.start, options.keep)
     sys.stdout.write(json.dumps(done) + "\n")
 
